@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.dynamics.effects.stops.model import End
 from flexclear.dynamics.model.internal_states import TURNS, internal_states
 from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.model.stops import End
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import NO_IMPACT
 from flexclear.scene.schema import Scene
