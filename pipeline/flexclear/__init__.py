@@ -25,6 +25,7 @@ __all__ = [
     "effects",
     "equilibrium",
     "exit_code",
+    "export",
     "frequencies",
     "load_scene",
     "open",
@@ -36,8 +37,10 @@ __all__ = [
     "sections",
     "sensitivities",
     "show",
+    "simulation",
     "stability",
     "stage",
+    "state_space",
     "sweep",
 ]
 

@@ -37,6 +37,8 @@ from flexclear.workflow.program import exit_code as exit_code
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.dynamics.stepwise import Simulation
+
 __version__ = version()
 
 
@@ -76,6 +78,28 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
     0.1959
     """
     return scenes.run(_loaded(scene))
+
+
+def simulation(scene: Scene | str | Path) -> Simulation:
+    """Begin a motion that advances in steps of your own, for controllers and forces in Python and for co-simulation.
+
+    `advance(1e-3)` goes on by a duration [s], with steps as short as accuracy, contacts and events inside need; `time`
+    is the present time.  `inputs["load.push"] = 3.0` sets a force, torque, set point or motion that the scene gives as
+    a number, in SI or as text with a unit, and `inputs` lists them.  `read("slider.position")` evaluates a quantity as
+    `[view] watch` names it, `equations()` mass matrix, bias forces and closures, `jacobian("slider.velocity")` a
+    velocity's change per free speed.  `state` is a value of bytes: set it to go back, to the last bit, in this or
+    another process.  A simulation is a context, or ends with `close()`.
+    Raises FlexclearError: InputError for wrong names and values, SolverError where the motion cannot continue.
+
+    >>> import flexclear as fc
+    >>> with fc.simulation("scenes/checks/pendulum.toml") as sim:
+    ...     sim.advance(0.2)
+    ...     round(sim.read("hinge.position"), 4)  # [rad]
+    0.1959
+    """
+    from flexclear.stages.stepping import begin
+
+    return begin(_loaded(scene), open_workplace())
 
 
 def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:

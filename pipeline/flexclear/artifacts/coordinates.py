@@ -40,6 +40,7 @@ joint_second_body? | joint | | body of the second frame
 coordinate? | coordinate | | joint, or joint.coordinate where the joint has several
 coordinate_joint? | coordinate | | name of the coordinate's joint
 coordinate_motion? | coordinate | | {_MOTION}
+internal? | internal | | part and number of the internal state
 drive? | drive | | name of the drive, of its coordinate, or of an actuator
 drive_motion? | drive | | {_MOTION}
 load? | load | | name of the load

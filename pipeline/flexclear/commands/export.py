@@ -26,6 +26,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Write the file and print what it holds."""
     (graph,) = scenes.graphs([options.scene], options.set)
-    given = {"at": scenes.moment(options.at), "held": options.held or None, "body": options.body}
+    given = {"at": scenes.moment(options.at), "held": options.held or None, "body": options.body, "fmi": options.fmi}
     asked = {name: value for name, value in given.items() if value is not None}
     print(formats.write(graph.scene, options.format, options.out, asked, open_workplace(options)))

@@ -1,4 +1,4 @@
-"""Models and results in the forms of other programs: state space, load histories, cards of an FE program.
+"""Models and results in the forms of other programs: FMUs, state space, load histories, cards of an FE program.
 
 To add a format: its entry in `FORMATS`.
 """
@@ -14,7 +14,7 @@ from flexclear.scene.load import edited
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
 from flexclear.scene.toml_files import read_toml
-from flexclear.stages import export, scenes
+from flexclear.stages import export, fmu, scenes
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace
 from flexclear.system.errors import InputError
@@ -146,6 +146,7 @@ class Format(NamedTuple):
 
 
 FORMATS = {
+    "fmu": Format(fmu.write, (".fmu",), ("fmi",)),
     "state-space": Format(_write_state_space, (".npz", ".nc", ".mat"), ("at", "held")),
     "loads": Format(_write_loads, (".csv", CARDS, ".nc", ".npz", ".mat", ".parquet", ".xlsx"), ("at", "body")),
 }
