@@ -132,8 +132,8 @@ class RigidBody(Moving):
     """Mass, centre of mass and inertia about it, all in the body frame."""
 
     type: Literal["rigid"]
-    mass: Annotated[Mass, Positive]
-    """mass of the body"""
+    mass: Annotated[Mass, Field(ge=0.0)]
+    """mass of the body; 0 for one that only joins two joints, or turns"""
     com: Position = (0.0, 0.0, 0.0)
     """centre of mass in the body frame"""
     inertia: Inertia
