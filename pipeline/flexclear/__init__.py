@@ -27,6 +27,7 @@ __all__ = [
     "exit_code",
     "frequencies",
     "load_scene",
+    "new",
     "open",
     "plan",
     "quantity",

@@ -146,17 +146,18 @@ def take_stops(at: Assembly) -> None:
         if not one.single:
             others.append(one.joint)
             continue
-        lower, upper = model.jnt_range[j]
+        ends = {key: end for key, end in zip(("lower", "upper"), model.jnt_range[j], strict=True) if np.isfinite(end)}
+        if not ends:
+            continue
         stiffness, damping = _of_limit(model, j, one)
         normal = {"law": "kelvin-voigt", "stiffness": stiffness, "damping": damping}
-        part = {"joint": one.joint, "lower": lower, "upper": upper, "normal": normal}
-        if not lower < at.q[one.address] < upper:
+        part = {"joint": one.joint, **ends, "normal": normal}
+        if not model.jnt_range[j][0] < at.q[one.address] < model.jnt_range[j][1]:
             part["initial_approach_speed"] = 0
         at.draft.add("stop", at.take(f"{one.joint}_ends", "stop"), part)
     if at.draft.parts.get("stop"):
         at.draft.comments["stop"] = (
-            "stops: limits of the joints; stiffness and damping are assumed, from solref and the inertia at the zero of "
-            "the model"
+            "stops: limits of the joints; stiffness and damping are assumed, from solref and the inertia at zero"
         )
         at.draft.changed.append("limits are stops with a stiffness [N m/rad, N/m]; MuJoCo's are soft (solref, solimp)")
     if others:

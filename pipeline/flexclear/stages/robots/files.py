@@ -7,7 +7,8 @@ limited before memory is taken for them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,14 +19,18 @@ from flexclear.system.external_files import require_file
 
 #: largest size of a file without its meshes [bytes], and largest number of files that it includes
 LARGEST_FILE, MOST_FILES = 32 << 20, 200
-#: elements whose number or size a file announces by these attributes, and the largest product that is read
-COUNTED = {"replicate": ("count",), "composite": ("count",), "flexcomp": ("count",), "hfield": ("nrow", "ncol")}
-COUNTED |= {"texture": ("width", "height"), "size": ("nkey", "nuserdata", "njmax", "nconmax")}
+#: elements of which a file announces copies, those of which it announces entries, with the attributes, and the largest
+#: products that are read
+COPIED, SIZED = ("replicate", "composite", "flexcomp"), {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}
 MOST_COPIES, MOST_ENTRIES = 2000, 20_000_000
+#: numbers of values of one user's object, or of keyframes
+MOST_VALUES = 10_000
 #: endings of surfaces that MuJoCo reads
 SURFACES = (".stl", ".obj", ".msh")
 #: attributes that are text even where they look like a number
 TEXT = {"name", "class", "childclass", "file", "filename", "content", "data"}
+#: attributes that may be infinite, besides those whose names end with "range"
+BOUNDS = {"lower", "upper", "effort", "velocity"}
 #: elements of URDF that MuJoCo does not read, with what they mean
 UNREAD = {
     "transmission": "transmissions of actuators",
@@ -54,7 +59,9 @@ def read(path: Path) -> Robot:
         raise InputError(
             str(path), "robots' files are read by MuJoCo, which is not installed", "pip install 'flexclear[robots]'"
         ) from None
-    root = _checked(path, path.parent, {})
+    read_files: dict[Path, ElementTree.Element] = {}
+    root = _checked(path, path.parent, read_files)
+    _require_ordinary(path, read_files.values())
     if root.tag not in ("mujoco", "robot"):
         problem = f"is neither a URDF nor an MJCF: its outermost element is <{root.tag}>, not <robot> or <mujoco>"
         raise InputError(str(path), problem, "name the robot's own file")
@@ -67,20 +74,23 @@ def read(path: Path) -> Robot:
             spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
         else:
             spec = mujoco.MjSpec.from_file(str(path))
+            spec.memory, spec.nuserdata, spec.njmax, spec.nconmax = -1, 0, -1, -1  # for simulations by MuJoCo
             spec.compiler.LRopt.mode = mujoco.mjtLRMode.mjLRMODE_NONE  # lengths of muscles, which it would simulate
-        robot.model = spec.compile()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of attributes that later releases of MuJoCo will not have
+            robot.model = spec.compile()
     except (ValueError, TypeError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(str(path), f"MuJoCo does not compile it: {reason}", "correct the file, or export it again")
+        problem = f"MuJoCo does not compile it: {reason}"
+        raise InputError(str(path), problem, "correct the file, or export it again") from None
     finally:
         mujoco.set_mju_user_warning(before)
     return robot
 
 
-def _checked(path: Path, folder: Path, seen: dict[Path, None]) -> ElementTree.Element:
+def _checked(path: Path, folder: Path, seen: dict[Path, ElementTree.Element]) -> ElementTree.Element:
     """Return the root of a file after checks of it and of all that it includes; folder: of the outermost file."""
     require_file(path, str(path))
-    seen[path.resolve()] = None
     if path.stat().st_size > LARGEST_FILE or len(seen) > MOST_FILES:
         raise InputError(str(path), f"is larger than {LARGEST_FILE >> 20} MB or includes more than {MOST_FILES} files")
     text = path.read_bytes()
@@ -90,6 +100,7 @@ def _checked(path: Path, folder: Path, seen: dict[Path, None]) -> ElementTree.El
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError(str(path), f"is not complete XML: {error}", "export or copy it again") from None
+    seen[path.resolve()] = root
     for element, copies in _nested(root):
         _check(path, element, copies)
         if element.tag in ("include", "model") and (name := element.get("file")) is not None:
@@ -101,27 +112,39 @@ def _checked(path: Path, folder: Path, seen: dict[Path, None]) -> ElementTree.El
     return root
 
 
+def _require_ordinary(path: Path, roots: Iterable[ElementTree.Element]) -> None:
+    """Raise InputError for a device or pipe among the files that the elements name: reading it may never end."""
+    elements = [element for root in roots for element in root.iter()]
+    folders = {e.get(key, "") for e in elements for key in ("meshdir", "texturedir", "assetdir")}
+    for name in {e.get(key, "") for e in elements for key in ("file", "filename")} - {""}:
+        for place in (path.parent / folder / name for folder in folders):
+            if place.exists() and not place.is_file():
+                raise InputError(str(path), f"names {place}, which is not an ordinary file", "name a file")
+
+
 def _nested(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, float]]:
     """Yield all elements, each with the number of copies that the elements around it and itself ask for."""
     waiting = [(root, 1.0)]
     while waiting:
         element, copies = waiting.pop()
-        if element.tag in ("replicate", "composite", "flexcomp"):
+        if element.tag in COPIED:
             copies *= math.prod(_numbers(element.get("count")) or [1.0])
         yield element, copies
         waiting += [(inner, copies) for inner in element]
 
 
 def _check(path: Path, element: ElementTree.Element, copies: float) -> None:
-    """Raise InputError for numbers that are none, and for numbers of copies or entries that are too large."""
+    """Raise InputError for numbers that are not finite, and for numbers of copies or entries that are too large."""
     for key, text in element.items():
-        if key not in TEXT and any(math.isnan(number) for number in _numbers(text)):
+        without = math.isnan if key in BOUNDS or key.endswith("range") else lambda number: not math.isfinite(number)
+        if key not in TEXT and any(without(number) for number in _numbers(text)):
             where = f'<{element.tag} name="{element.get("name", "")}"> {key}="{text}"'
-            raise InputError(str(path), f"{where} is not a number", "write a number there")
-    entries = math.prod(n for key in COUNTED.get(element.tag, ()) for n in _numbers(element.get(key)) or [1.0])
-    for count, most in ((copies, MOST_COPIES), (entries, MOST_ENTRIES)):
+            raise InputError(str(path), f"{where} is not a finite number", "write a number there")
+    values = max([0.0, *(n for k, text in element.items() for n in _numbers(text) if k.startswith(("nuser_", "nkey")))])
+    entries = math.prod(n for key in SIZED.get(element.tag, ()) for n in _numbers(element.get(key)) or [1.0])
+    for count, most in ((copies, MOST_COPIES), (entries, MOST_ENTRIES), (values, MOST_VALUES)):
         if count > most:
-            raise InputError(str(path), f"<{element.tag}> asks for {count:.3g} copies, more than {most}", "use fewer")
+            raise InputError(str(path), f"<{element.tag}> asks for {count:.3g} entries, more than {most}", "use fewer")
 
 
 def _numbers(text: str | None) -> list[float]:

@@ -59,7 +59,7 @@ def _visible(model: Any, drawn: list[Any]) -> list[Any]:
 def _color(model: Any, n: int) -> str:
     material = model.geom_matid[n]
     rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[n]
-    return "#" + "".join(f"{int(round(255 * float(np.clip(c, 0.0, 1.0)))):02X}" for c in rgba[:3])
+    return "#" + "".join(f"{round(255 * float(np.clip(c, 0.0, 1.0))):02X}" for c in rgba[:3])
 
 
 def _shapes(model: Any, n: int, place: Placement, folder: str, files: dict[str, bytes]) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain, count
 from typing import Any, NamedTuple
 
 import mujoco
@@ -75,7 +76,7 @@ class Assembly:
         """Return a name that no other part has; a second one of the same name says what it is."""
         plain = re.sub(r"[^\w-]+", "_", wanted)[: LONGEST_NAME // 2].strip("_") or what
         plain = plain if plain.isascii() else re.sub(r"[^\x00-\x7f]", "_", plain)
-        names = [plain, f"{plain}_{what}", *(f"{plain}_{what}_{k}" for k in range(2, len(self.taken) + 3))]
+        names = chain((plain, f"{plain}_{what}"), (f"{plain}_{what}_{k}" for k in count(2)))
         name = next(name for name in names if name not in self.taken)
         self.taken.add(name)
         return name
@@ -142,9 +143,15 @@ def take_bodies(at: Assembly) -> None:
         else:
             _join(at, b, name, joints, owner, here)
         at.places.append((name, Placement()))
+    fixed = 0
     for s in range(model.nsite):
-        if site := mujoco.mj_id2name(model, OBJECT.mjOBJ_SITE, s):
-            at.frame_of(model.site_bodyid[s], at.take(site, "site"), placement(model.site_pos[s], model.site_quat[s]))
+        place, site = placement(model.site_pos[s], model.site_quat[s]), mujoco.mj_id2name(model, OBJECT.mjOBJ_SITE, s)
+        if at.places[model.site_bodyid[s]][0] == GROUND:
+            fixed += 1
+        elif site:
+            at.frame_of(model.site_bodyid[s], at.take(site, "site"), place)
+    if fixed:
+        draft.lost.append(f"sites on what does not move: {fixed}")
 
 
 def _join(at: Assembly, b: int, name: str, joints: range, owner: str, here: Placement) -> None:

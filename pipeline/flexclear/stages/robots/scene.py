@@ -9,11 +9,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from flexclear.scene.limits import Limits
 from flexclear.stages.robots.acting import take_actuators, take_loads, take_stops
 from flexclear.stages.robots.files import Robot
 from flexclear.stages.robots.geometry import take_geometry
 from flexclear.stages.robots.mechanism import OBJECT, Assembly, take_bodies, take_loops, take_start
 from flexclear.stages.robots.text import Draft, scene_text
+from flexclear.system.errors import InputError
 
 #: length of the run and its output [s], for the user to change
 TIME, OUTPUT = {"end": "1 s"}, {"interval": "2 ms"}
@@ -23,9 +25,12 @@ UNLIKE |= {"nplugin": "plugins", "nmocap": "bodies moved from outside (mocap), f
 UNLIKE |= {"ntuple": "tuples", "nnumeric": "numeric fields", "ntext": "texts", "nuserdata": "numbers for users"}
 
 
-def scene_of(robot: Robot, source: Path, stem: str) -> tuple[str, dict[str, bytes]]:
-    """Return the text of the scene `stem`.toml of a robot, and the files next to it by name."""
-    model, draft = robot.model, Draft(lost=[*robot.lost])
+def scene_of(robot: Robot, source: Path, stem: str) -> tuple[str, dict[str, bytes], list[str]]:
+    """Return the text of the scene `stem`.toml of a robot, the files next to it by name, and what is not taken over."""
+    model, draft, most = robot.model, Draft(lost=[*robot.lost]), Limits().parts
+    if max(model.nbody, model.njnt) > most:
+        problem = f"has {model.nbody} bodies and {model.njnt} joints, more than the {most} that a scene may have"
+        raise InputError(str(source), problem, "name a smaller model")
     key = model.nkey > 0
     q, v = (model.key_qpos[0], model.key_qvel[0]) if key else (model.qpos0, np.zeros(model.nv))
     at = Assembly(model, draft, np.array(q), np.array(v))
@@ -37,10 +42,12 @@ def scene_of(robot: Robot, source: Path, stem: str) -> tuple[str, dict[str, byte
     files = take_geometry(at, f"{stem}_surfaces")
     starts = take_start(at)
     draft.lost += _unlike(model)
-    title = _title(model, source)
-    top = {"title": title, "time": TIME, "output": OUTPUT}
+    if len(draft.parts["body"]) == 1:
+        raise InputError(str(source), "holds no body that moves", "name the robot's own file")
+    top = {"title": _title(model, source), "time": TIME, "output": OUTPUT}
     end = {"start.joint": starts} if starts else {}
-    return scene_text([*_head(robot, source, stem, draft)], top, draft, end), files
+    draft.lost[:] = dict.fromkeys(draft.lost)
+    return scene_text([*_head(robot, source, stem, draft)], top, draft, end), files, draft.lost
 
 
 def _title(model: Any, source: Path) -> str:
@@ -58,7 +65,7 @@ def _head(robot: Robot, source: Path, stem: str, draft: Draft) -> Iterator[str]:
     yield "Numbers are SI. Names are those of the file, with _ for what names cannot have."
     for says, items in (("Different here:", draft.changed), ("Not taken over:", draft.lost)):
         if items:
-            yield from ("", says, *(f"- {item}" for item in dict.fromkeys(items)))
+            yield from ("", says, *(f"- {item}" for item in items))
     yield ""
 
 
