@@ -23,4 +23,5 @@ NAMES = {
     "plan": "plan:FAMILY",
     "effects": "effects:FAMILY",
     "turning": "turning:FAMILY",
+    "robots": "robots:FAMILY",
 }

@@ -166,6 +166,7 @@ def _prepare(root: ElementTree.Element, path: Path) -> list[str]:
     lost = [f"{text}: {n}" for tag, text in UNREAD.items() if (n := len(list(root.iter(tag))))]
     if any(float(limit.get("velocity") or 0.0) > 0.0 for limit in root.iter("limit")):
         lost.append("limits of the joints' speeds")
+    unread: dict[str, list[str]] = {}
     for link in root.iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             mesh = shape.find("geometry/mesh")
@@ -180,9 +181,9 @@ def _prepare(root: ElementTree.Element, path: Path) -> list[str]:
                 problem = f'the mass of <link name="{link.get("name")}"> follows from "{name}", which cannot be read'
                 raise InputError(str(path), problem, "put the mesh there, or give the link an <inertial>")
             why = "there is no such file" if file is None else f"only {', '.join(SURFACES)} are read"
-            lost.append(f"the {shape.tag} surface {name} of {link.get('name')}: {why}")
+            unread.setdefault(f"{shape.tag} surfaces ({why})", []).append(f"{link.get('name')}: {name}")
             link.remove(shape)
-    return lost
+    return [*lost, *(f"{what} of {', '.join(names)}" for what, names in unread.items())]
 
 
 def _find(name: str, folder: Path) -> Path | None:

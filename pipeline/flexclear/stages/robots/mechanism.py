@@ -229,8 +229,8 @@ def _close(at: Assembly, e: int, name: str, weld: bool) -> bool:
         at.draft.lost.append(f"equality constraint {name}: both sides belong to one body")
         return False
     between = [at.frame_of(body, name, place) for body, place in zip(ends, places, strict=True)]
-    comment = f"closes a loop: <{'weld' if weld else 'connect'}>"
-    at.draft.add("joint", name, {"type": "fixed" if weld else "spherical", "between": between}, comment)
+    source = f"closes a loop: <{'weld' if weld else 'connect'}>"
+    at.draft.add("joint", name, {"type": "fixed" if weld else "spherical", "between": between, "source": source})
     return True
 
 
