@@ -35,9 +35,8 @@ MODELS = {
     "acrobot": ("dm-control", f"{SUITE}/acrobot.xml"),
     "fish": ("dm-control", f"{SUITE}/fish.xml"),
     "quadruped": ("dm-control", f"{SUITE}/quadruped.xml"),
-    "dog": ("dm-control", f"{SUITE}/dog.xml"),
     "jaco arm": ("dm-control", "dm_control/third_party/kinova/jaco_arm.xml"),
-    "fruit fly": ("dm-control", "dm_control/locomotion/walkers/assets/fruitfly_v2/fruitfly.xml"),
+    "manipulator": ("dm-control", f"{SUITE}/manipulator.xml"),
     "inverted double pendulum": ("gymnasium", f"{GYM}/inverted_double_pendulum.xml"),
     "half cheetah": ("gymnasium", f"{GYM}/half_cheetah.xml"),
     "ant": ("gymnasium", f"{GYM}/ant.xml"),
@@ -45,7 +44,6 @@ MODELS = {
     "UR5": ("example-robot-data", f"{DATA}/ur_description/urdf/ur5_robot.urdf"),
     "Panda": ("example-robot-data", f"{DATA}/panda_description/urdf/panda.urdf"),
     "Go2": ("example-robot-data", f"{DATA}/go2_description/urdf/go2.urdf"),
-    "G1": ("example-robot-data", f"{DATA}/g1_description/urdf/g1_29dof_with_hand_rev_1_0.urdf"),
     "Talos": ("example-robot-data", f"{DATA}/talos_data/robots/talos_full_v2.urdf"),
 }
 #: random poses of each model; time steps of MuJoCo's RK4 [s]; length of the free motion [s]

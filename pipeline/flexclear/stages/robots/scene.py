@@ -72,7 +72,7 @@ def _head(robot: Robot, source: Path, stem: str, draft: Draft) -> Iterator[str]:
 def _unlike(model: Any) -> Iterator[str]:
     """Yield what of a model has no counterpart in a scene."""
     touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
-    if touching or model.npair:
+    if (touching or model.npair) and not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
         yield f"contacts between geoms, of which {touching} may touch; a `ball-on-plane` is a ball above a floor"
     if model.opt.density or model.opt.viscosity or np.any(model.opt.wind):
         yield "forces of air or water (density, viscosity, wind)"
