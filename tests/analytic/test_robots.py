@@ -204,7 +204,7 @@ def test_joints_of_a_file_keep_their_coordinates_limits_and_springs(tmp_path: Pa
     assert "point" in scene.body["hat"].frames  # a body without mass belongs to the one that carries it
     assert [shape.type for shape in scene.body["thigh"].geometry] == ["cylinder", "sphere", "sphere"]
     assert "not drawn: 1 plane" in text
-    assert "contacts between geoms, of which 6 may touch" in text
+    assert "contacts between geoms, of which 5 may touch" in text
     run = fc.run(fc.edited(scene, {"time.end": "1 ms", "output.interval": "1 ms"}))
     model = mujoco.MjModel.from_xml_string(TREE)
     data = mujoco.MjData(model)
