@@ -102,7 +102,8 @@ def mechanism(
 
     stressed: True colours flexible bodies by von Mises stress.  InputError for a run that records none.
     """
-    looks, at = looks or Looks(), Layout(run, parameters(run), bundles)
+    looks = looks or Looks()
+    at = Layout(run, shown_parts(parameters(run), looks), bundles)
     if stressed and not body_shape.stress_recorded(run):
         problem = "the run records no von Mises stress"
         raise InputError(
@@ -120,6 +121,29 @@ def mechanism(
     top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
     shown = cloud(run, parts, flexible, samples(run))
     return Mechanism(run, parts, flexible, chosen_view, size, shown, looks, top)
+
+
+def shown_parts(text: Mapping[str, Any], looks: Looks) -> dict[str, Any]:
+    """Return the parts of a scene without rotors of no mass and shape, and without what acts on their joints."""
+    without = {
+        name
+        for name, body in text.get("body", {}).items()
+        if body.get("mass") == 0.0
+        and np.any(body.get("inertia", 0.0))
+        and not looks.bodies.get(name, {}).get("geometry")
+    }
+    bearings = {
+        name
+        for name, joint in text.get("joint", {}).items()
+        if not without.isdisjoint(frame.partition(".")[0] for frame in joint["between"])
+    }
+
+    def drawn(name: str, part: Any) -> bool:
+        sides = {str(part.get(key, "")).partition(".")[0] for key in ("joint", "first", "second", "frame")}
+        return name not in without | bearings and sides.isdisjoint(without | bearings)
+
+    families = {"body", "joint", "drive", "load", "stop", "gear"} if without else set()
+    return {key: {n: p for n, p in one.items() if drawn(n, p)} if key in families else one for key, one in text.items()}
 
 
 def cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible], steps: Sequence[int]) -> np.ndarray:
@@ -196,7 +220,7 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
             com, inertia = at.centre(name), np.array(body["inertia"])
             key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
             color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
-            solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
+            solid = equivalent(body["mass"], inertia) if np.any(inertia) and body["mass"] else None
             drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
             if len(drawn.points):
                 yield Part(owner, surfaces.moved(drawn, -com), color)

@@ -73,7 +73,8 @@ def start_view(
     run: xr.Dataset, bundles: Mapping[str, xr.Dataset], gaps: Sequence[Missing], looks: mechanism.Looks | None = None
 ) -> StartView:
     """Return the view of a start; gaps: of joints that do not fit."""
-    text, drawn = parameters(run), mechanism.mechanism(run, bundles, looks)
+    drawn = mechanism.mechanism(run, bundles, looks)
+    text = mechanism.shown_parts(parameters(run), drawn.looks)
     at = layout.Layout(run, text, bundles)
     # world position of each joint's second frame, and the axes of its first one
     joints = {
@@ -208,7 +209,7 @@ def _marks(
         where = np.mean([joints[one.partition(".")[0]][0] for one in pair], axis=0)
         yield Mark(name, f"gear {gear['ratio']}: {' – '.join(pair)}", where, JOINT)
     for name, where in positions.items():
-        if name not in used:
+        if name not in used and name.partition(".")[0] in text.get("body", {}):
             yield Mark(name, "frame", where, FRAME)
 
 
