@@ -85,9 +85,7 @@ def _load_ball(at: Assembly, one: Coordinate, stiffness: float, damping: float, 
         if number:
             part[key] = [number * free] * 3 + [number] * 3
     if damping:
-        at.draft.changed.append(
-            f"damping of {one.joint} acts on rates of the rotation vector: equal for small rotations"
-        )
+        at.draft.changed.append(f"damping of {one.joint} acts on the rate of the rotation vector: equal if it is small")
     at.draft.add("load", ball, part)
 
 
@@ -97,16 +95,13 @@ def _add_rotor(at: Assembly, one: Coordinate, armature: float) -> None:
         at.draft.lost.append(f"armature of joint {one.joint}, a {one.type} one: {armature:.6g} kg m^2")
         return
     name, draft = at.take(f"{one.joint}_rotor", "body"), at.draft
-    frames = draft.parts["body"][GROUND].setdefault("frames", {})
-    frames.setdefault(ROTORS, {})
-    inertia = [armature] * 3
-    rotor = {"type": "rigid", "mass": 0, "inertia": inertia, "geometry": [], "frames": {"axis": {}}}
+    bearing, between = at.take(f"{name}_bearing", "joint"), [f"{GROUND}.{ROTORS}", f"{name}.axis"]
+    draft.parts["body"][GROUND].setdefault("frames", {}).setdefault(ROTORS, {})
+    rotor = {"type": "rigid", "mass": 0, "inertia": [armature] * 3, "geometry": [], "frames": {"axis": {}}}
     draft.add("body", name, rotor, f"armature of {one.joint}, as the inertia of a rotor that turns with it")
-    between = [f"{GROUND}.{ROTORS}", f"{name}.axis"]
-    draft.add("joint", at.take(f"{name}_bearing", "joint"), {"type": "revolute", "between": between})
-    ratio: Any = 1 if one.turns else "1 rad/m"
-    bearing = list(draft.parts["joint"])[-1]
-    draft.add("gear", at.take(f"{name}_gear", "gear"), {"first": one.joint, "second": bearing, "ratio": ratio})
+    draft.add("joint", bearing, {"type": "revolute", "between": between})
+    coupled = {"first": one.joint, "second": bearing, "ratio": 1 if one.turns else "1 rad/m"}
+    draft.add("gear", at.take(f"{name}_gear", "gear"), coupled)
 
 
 def _take_lines(at: Assembly) -> None:
@@ -141,13 +136,10 @@ def take_stops(at: Assembly) -> None:
     if model.opt.disableflags & DISABLED.mjDSBL_LIMIT:
         return
     for j, one in at.joints.items():
-        if not model.jnt_limited[j]:
-            continue
-        if not one.single:
+        if model.jnt_limited[j] and not one.single:
             others.append(one.joint)
-            continue
         ends = {key: end for key, end in zip(("lower", "upper"), model.jnt_range[j], strict=True) if np.isfinite(end)}
-        if not ends:
+        if not model.jnt_limited[j] or not one.single or not ends:
             continue
         stiffness, damping = _of_limit(model, j, one)
         normal = {"law": "kelvin-voigt", "stiffness": stiffness, "damping": damping}
@@ -182,9 +174,8 @@ def take_actuators(at: Assembly, control: np.ndarray, activation: np.ndarray) ->
     for a in range(model.nactuator):
         name = at.name(OBJECT.mjOBJ_ACTUATOR, a, "actuator")
         why = _unlike(model, a)
-        one = (
-            at.joints.get(model.actuator_trnid[a][0]) if model.actuator_trntype[a] != TRANSMISSION.mjTRN_SITE else None
-        )
+        on_site = model.actuator_trntype[a] == TRANSMISSION.mjTRN_SITE
+        one = None if on_site else at.joints.get(model.actuator_trnid[a][0])
         if why is None and one is not None and not one.single:
             why = f"it acts on a {one.type} joint"
         if why is not None:
@@ -197,9 +188,8 @@ def take_actuators(at: Assembly, control: np.ndarray, activation: np.ndarray) ->
         if dynamics == DYNAMICS.mjDYN_INTEGRATOR:
             u = [float(activation[model.actuator_actadr[a]]), u[0]]
         elif dynamics != DYNAMICS.mjDYN_NONE:
-            at.draft.changed.append(
-                f"actuator {name} acts at once, without its filter of {model.actuator_dynprm[a][0]:.6g} s"
-            )
+            constant = model.actuator_dynprm[a][0]
+            at.draft.changed.append(f"actuator {name} acts at once, without its filter of {constant:.6g} s")
         if one is None:
             _push_site(at, a, name, u[0])
         else:
@@ -208,12 +198,8 @@ def take_actuators(at: Assembly, control: np.ndarray, activation: np.ndarray) ->
 
 def _unlike(model: Any, a: int) -> str | None:
     """Return why an actuator has no counterpart, or None."""
-    gain, bias, dynamics = (
-        GAIN(int(model.actuator_gaintype[a])),
-        BIAS(int(model.actuator_biastype[a])),
-        DYNAMICS(int(model.actuator_dyntype[a])),
-    )
-    via = TRANSMISSION(int(model.actuator_trntype[a]))
+    gain, bias = GAIN(int(model.actuator_gaintype[a])), BIAS(int(model.actuator_biastype[a]))
+    dynamics, via = DYNAMICS(int(model.actuator_dyntype[a])), TRANSMISSION(int(model.actuator_trntype[a]))
     linear = {DYNAMICS.mjDYN_NONE, DYNAMICS.mjDYN_INTEGRATOR, DYNAMICS.mjDYN_FILTER, DYNAMICS.mjDYN_FILTEREXACT}
     if gain not in (GAIN.mjGAIN_FIXED, GAIN.mjGAIN_AFFINE) or bias not in (BIAS.mjBIAS_NONE, BIAS.mjBIAS_AFFINE):
         return f"its force is of type {gain.name.removeprefix('mjGAIN_').lower()}"
@@ -224,6 +210,8 @@ def _unlike(model: Any, a: int) -> str | None:
         return None if still and model.actuator_trnid[a][1] < 0 else "it measures a site"
     if via not in (TRANSMISSION.mjTRN_JOINT, TRANSMISSION.mjTRN_JOINTINPARENT):
         return f"it acts through a {via.name.removeprefix('mjTRN_').lower()}"
+    if not model.actuator_gear[a][0]:
+        return "its gear is 0"
     if model.actuator_armature[a] or model.actuator_damping[a] or np.any(model.actuator_dampingpoly[a]):
         return "it has an armature or a damping of its own"
     return None
@@ -237,9 +225,7 @@ def _push_site(at: Assembly, a: int, name: str, u: float) -> None:
     for key, gear, unit in (("force", model.actuator_gear[a][:3], "N"), ("torque", model.actuator_gear[a][3:], "N m")):
         if np.any(gear):
             part = {"type": f"point-{key}", "frame": frame, key: clean(size * gear), "axes": "frame"}
-            label = (
-                name if key == "force" or not np.any(model.actuator_gear[a][:3]) else at.take(f"{name}_torque", "load")
-            )
+            label = name if name not in at.draft.parts.get("load", {}) else at.take(f"{name}_torque", "load")
             at.draft.add("load", label, part, f"{name}: per unit of its control {(k * gear).tolist()} {unit}")
 
 
@@ -266,34 +252,21 @@ def _push_joint(at: Assembly, a: int, name: str, one: Coordinate, u: list[float]
     span = ", from {:.6g} to {:.6g}".format(*model.actuator_ctrlrange[a]) if model.actuator_ctrllimited[a] else ""
     comment = f"control of {name}: {u[0]:.6g}{span}"
     constant, along, over = gear * (g[0] * u[0] + b[0]), gear**2 * (g[1] * u[0] + b[1]), gear**2 * (g[2] * u[0] + b[2])
-    growing = gear * g[0] * u[1]
-    keys = {"joint": one.joint}
-    if np.any(g[1:] * u[1]) or (growing and over and along):
+    growing, stiff, keys = gear * g[0] * u[1], along or over, {"joint": one.joint}
+    if np.any(g[1:] * u[1]) or (growing and over):
         at.draft.lost.append(f"actuator {name}: its gain changes with its activation")
-    elif along:
-        reference = [-constant / along, -growing / along] if growing else -constant / along
-        part = {**keys, "reference": _line(reference), "proportional": -along, "derivative": -over, **limits}
-        at.draft.add(
-            "load",
-            name,
-            {"type": "pid", **part},
-            f"{comment}; a change of 1 moves the reference by {-gear * g[0] / along:.6g}",
-        )
-    elif over:
-        part = {**keys, "reference": _line([0.0, -constant / over]), "derivative": -over, **limits}
-        at.draft.add(
-            "load",
-            name,
-            {"type": "pid", **part},
-            f"{comment}; a change of 1 moves the speed by {-gear * g[0] / over:.6g}",
-        )
+    elif stiff:
+        reference = [-constant / along, -growing / along] if along else [0.0, -constant / over]
+        gains = {"reference": _line(reference), "proportional": -along, "derivative": -over}
+        says = f"{comment}; a change of 1 moves the reference{'' if along else ' speed'} by {-gear * g[0] / stiff:.6g}"
+        at.draft.add("load", name, {"type": "pid", **keys, **gains, **limits}, says)
     else:
-        force = _line([constant, growing]) if growing else float(np.clip(constant, low, high))
+        force = _line([constant, growing] if growing else [np.clip(constant, low, high)])
         says = f"{comment}; a force, or torque, of {gear * g[0]:.6g} per unit"
         says += f", within {low:.6g} and {high:.6g}" if limits else ""
         at.draft.add("load", name, {"type": "joint-force", **keys, "force": force}, says)
 
 
-def _line(law: Any) -> Any:
-    """Return a law of time: a constant, or a polynomial of these coefficients."""
-    return {"type": "polynomial", "coefficients": law} if isinstance(law, list) else law
+def _line(coefficients: list[float]) -> Any:
+    """Return a law of time: a constant, or a polynomial."""
+    return {"type": "polynomial", "coefficients": coefficients} if any(coefficients[1:]) else coefficients[0]
