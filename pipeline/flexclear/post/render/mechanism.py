@@ -139,8 +139,8 @@ def shown_parts(text: Mapping[str, Any], looks: Looks) -> dict[str, Any]:
     }
 
     def drawn(name: str, part: Any) -> bool:
-        sides = {str(part.get(key, "")).partition(".")[0] for key in ("joint", "first", "second", "frame")}
-        return name not in without | bearings and sides.isdisjoint(without | bearings)
+        ends = [*part.get("between", ()), *(str(part.get(key, "")) for key in ("joint", "first", "second", "frame"))]
+        return name not in without and (without | bearings).isdisjoint(end.partition(".")[0] for end in ends)
 
     families = {"body", "joint", "drive", "load", "stop", "gear"} if without else set()
     return {key: {n: p for n, p in one.items() if drawn(n, p)} if key in families else one for key, one in text.items()}
@@ -219,11 +219,17 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
         elif "inertia" in body:
             com, inertia = at.centre(name), np.array(body["inertia"])
             key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
+            key = (rod_of(name, body),) if "segment" in body else key
             color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
             solid = equivalent(body["mass"], inertia) if np.any(inertia) and body["mass"] else None
             drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
             if len(drawn.points):
                 yield Part(owner, surfaces.moved(drawn, -com), color)
+
+
+def rod_of(name: str, body: Mapping[str, Any]) -> str:
+    """Return the name of the rod of which a body is a segment; its own name for a whole body."""
+    return name.removesuffix(f"_{body['segment'][0]}") if "segment" in body else name
 
 
 def _with_wheels(
@@ -300,7 +306,9 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, s
     columns = np.flatnonzero(run.mode_body.values == name)
     q = run.modal_coordinate.values[:, columns]
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
-    scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
+    fitting = max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
+    in_segments = "segment" in parameters(run)["body"][name]  # these fit together only as they are
+    scale = 1.0 if in_segments else looks.exaggeration or fitting
     color = looks.bodies.get(name, {}).get("color")
     shown = stressed and name in body_shape.stress_recorded(run)
     if stressed:  # grey does not look like a stress
