@@ -124,19 +124,11 @@ def mechanism(
 
 
 def shown_parts(text: Mapping[str, Any], looks: Looks) -> dict[str, Any]:
-    """Return the parts of a scene without rotors of no mass and shape, and without what acts on their joints."""
-    without = {
-        name
-        for name, body in text.get("body", {}).items()
-        if body.get("mass") == 0.0
-        and np.any(body.get("inertia", 0.0))
-        and not looks.bodies.get(name, {}).get("geometry")
-    }
-    bearings = {
-        name
-        for name, joint in text.get("joint", {}).items()
-        if not without.isdisjoint(frame.partition(".")[0] for frame in joint["between"])
-    }
+    """Return the parts of a scene without bodies of no shape that carry nothing, and without what acts on them."""
+    sides = [{frame.partition(".")[0] for frame in one["between"]} for one in text.get("joint", {}).values()]
+    unshaped = {name for name, look in looks.bodies.items() if not look.get("geometry", True)}
+    without = {name for name in unshaped if sum(name in both for both in sides) == 1}
+    bearings = {name for name, both in zip(text.get("joint", ()), sides, strict=True) if not without.isdisjoint(both)}
 
     def drawn(name: str, part: Any) -> bool:
         ends = [*part.get("between", ()), *(str(part.get(key, "")) for key in ("joint", "first", "second", "frame"))]

@@ -97,7 +97,8 @@ def _add_rotor(at: Assembly, one: Coordinate, armature: float) -> None:
     name, draft = at.take(f"{one.joint}_rotor", "body"), at.draft
     bearing, between = at.take(f"{name}_bearing", "joint"), [f"{GROUND}.{ROTORS}", f"{name}.axis"]
     draft.parts["body"][GROUND].setdefault("frames", {}).setdefault(ROTORS, {})
-    rotor = {"type": "rigid", "mass": 0, "inertia": [armature] * 3, "geometry": [], "frames": {"axis": {}}}
+    # its mass does nothing: it turns about its own centre
+    rotor = {"type": "rigid", "mass": armature, "inertia": [armature] * 3, "geometry": [], "frames": {"axis": {}}}
     draft.add("body", name, rotor, f"armature of {one.joint}, as the inertia of a rotor that turns with it")
     draft.add("joint", bearing, {"type": "revolute", "between": between})
     coupled = {"first": one.joint, "second": bearing, "ratio": 1 if one.turns else "1 rad/m"}
