@@ -25,6 +25,7 @@ __all__ = [
     "effects",
     "equilibrium",
     "exit_code",
+    "export",
     "frequencies",
     "load_scene",
     "open",
@@ -39,6 +40,7 @@ __all__ = [
     "simulation",
     "stability",
     "stage",
+    "state_space",
     "sweep",
 ]
 

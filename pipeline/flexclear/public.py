@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from flexclear.scene import load
 from flexclear.scene.schema import Scene
-from flexclear.stages import scenes
+from flexclear.stages import formats, scenes
 from flexclear.stages import show as start_pose
 from flexclear.stages.graph import Graph
 from flexclear.stages.single_stage import Step, single_stage
@@ -258,6 +258,35 @@ def frequencies(
     (1.5836, 0.1)
     """
     return scenes.linear(_loaded(scene), time, drives=drives, moving=moving, speeds=speeds, drive=drive)
+
+
+def state_space(
+    scene: Scene | str | Path,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    *,
+    held: bool = False,
+) -> xr.Dataset:
+    """Return matrices A, B, C, D of small motions about `equilibrium` (schema STATE_SPACE), in changes from there.
+
+    Inputs are the values of loads, references of controllers and forces of drives; outputs the watched quantities.
+    time, drives, errors: see `equilibrium`.  held: the drives hold their positions, and their forces are no inputs.
+
+    >>> import flexclear as fc
+    >>> fc.state_space("scenes/checks/oscillator.toml")["A"].values.round(9).tolist()
+    [[0.0, 1.0], [-100.0, -2.0]]
+    """
+    return scenes.linear(_loaded(scene), time, task="state_space", drives=drives, held=held)
+
+
+def export(scene: Scene | str | Path, format: str, target: str | Path | None = None, **options: Any) -> str:
+    """Write a scene for another program, as ``flexclear export`` does, and return what it prints.
+
+    format: "state-space" or "loads".  target: file, by default one named like the scene in the current folder.
+    options: `at` [s], `held` and `body` of the command.  Raises FlexclearError.
+    """
+    path = None if target is None else Path(target)
+    return formats.write(_loaded(scene), format, path, options, open_workplace())
 
 
 def compare(

@@ -408,9 +408,9 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
 
 
 def _tables(node: object) -> Iterator[dict[str, Any]]:
-    """Yield the laws that are read from a file, at any depth."""
+    """Yield the laws and tables that are read from a file, at any depth."""
     if isinstance(node, dict):
-        if node.get("type") == "table" and isinstance(node.get("file"), str) and "points" not in node:
+        if isinstance(node.get("file"), str) and "points" not in node:
             yield node
         node = list(node.values())
     if isinstance(node, list):

@@ -19,7 +19,7 @@ from flexclear.dynamics.model.internal_states import named_states
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import doubts
 from flexclear.dynamics.model.stops import ends_an_angle
-from flexclear.dynamics.record import bushings, controllers, gears, joint_friction, stress, wear
+from flexclear.dynamics.record import bushings, controllers, frame_loads, gears, joint_friction, stress, wear
 from flexclear.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.dynamics.record.topology import topology
 from flexclear.dynamics.record.wrenches import every_joint_wrench, held_moments
@@ -93,7 +93,7 @@ RECORDS = {
 #: of effects: warnings about the results of a run
 WARNINGS = {"joint_friction": joint_friction.warnings}
 #: variables that a scene's ``[output]`` requests, by its key
-ON_REQUEST = {"stress": stress.record}
+ON_REQUEST = {"stress": stress.record, "frame_loads": frame_loads.record}
 #: beginnings of the names of the ledger's variables
 _LEDGER = (
     *("kinetic", "potential", "elastic", "dissipated", "drive_work", "energy_error", "constraint_error", "load_work"),
@@ -191,6 +191,8 @@ def _tilts(run: Run) -> Iterator[str]:
     from flexclear.dynamics.contact import validity
 
     model, time = run.model, run.trajectory.time
+    if not np.ptp(time) > 0.0:  # an equilibrium has no mean
+        return
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
     for c, held in held_moments(Motions(model, run.observed)).items():
         contact, impulse = model.contacts[c], ledger.series(model, run.observed)["contact_impulse"][1][:, c]

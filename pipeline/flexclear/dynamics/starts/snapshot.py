@@ -18,6 +18,7 @@ from flexclear.scene.clearance import Clearance
 from flexclear.scene.drives import JointDrive
 from flexclear.scene.fields import Pose
 from flexclear.scene.laws import Constant, Polynomial
+from flexclear.scene.loads import JointForce
 from flexclear.scene.parts import Ground, Stop
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import JointStart, ModalStart, Start
@@ -105,6 +106,19 @@ def held(scene: Scene, starts: Iterable[Given], law: Callable[[Given, float], Co
                 joint=start.joint, coordinate=start.coordinate.name, law=law(start, start.position)
             )
     return drives
+
+
+def released(scene: Scene, forces: Mapping[str, float]) -> Scene:
+    """Return the scene with constant forces [N or N m] in place of drives of joints, named ``drive.<name>``."""
+    loads: dict[str, Any] = {}
+    for name, force in forces.items():
+        drive: Any = scene.drive[name]
+        law = Constant(type="constant", value=force)
+        loads[f"drive.{name}"] = JointForce(
+            type="joint-force", joint=drive.joint, coordinate=drive.coordinate, force=law
+        )
+    kept = {name: drive for name, drive in scene.drive.items() if name not in forces}
+    return scene.model_copy(update={"drive": kept, "load": {**scene.load, **loads}})
 
 
 def joint_starts(start: Start, left: Callable[[JointStart], JointStart | None]) -> dict[str, dict[str, JointStart]]:
