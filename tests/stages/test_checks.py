@@ -140,7 +140,12 @@ WRONG = {
         {"body.slider.velocity": ("velocity = ", "joints and drives do not allow the given velocities of slider")},
     ),
     "events that are true at the start": (
-        {'at = "ideal"\n': "", 'B"]\nclearance': 'B"]\ninitial_approach_speed = 0\nclearance'},
+        {
+            'at = "ideal"\n': "",
+            'type = "clearance-revolute"': 'type = "revolute"',
+            'clearance = "0.1 mm"\npin_radius = "8 mm"\nlength = "16 mm"\n': "",
+            'normal = { law = "flores", restitution = 0.8, stiffness = 1e9 }\n': "",
+        },
         '[event.a]\nat = "O.position > 39 deg"\nrelease = "joint.A"\n'
         '[event.b]\nat = "slider.position.x < 0.3 m"\nrelease = "joint.guide"\n'
         '[event.c]\nat = "slider.position.x > 0.3 m"\nrelease = "load.gravity"\n',
