@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from importlib import import_module
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.scene import provenance
 from flexclear.scene.limits import Limits, check_cells
 from flexclear.scene.load import RECIPE, is_file, require_kind
-from flexclear.scene.registry import module_of
 from flexclear.scene.toml_files import read_toml
+from flexclear.structure.kinds import name_of
 from flexclear.system.errors import InputError
 from flexclear.system.external_files import companions
 
@@ -21,18 +20,19 @@ if TYPE_CHECKING:
 
     from flexclear.system.progress import Progress
 
-KINDS = "flexclear.structure.kinds"
 #: place in errors of the kinds of bodies, which do not know the recipe's file
 PLACE = "mesh recipe"
 #: keys of a recipe's shape that name files
 FILES = ("file", "stiffness", "mass", "unknowns", "nodes", "basis", "listing")
 
 
-def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def params(
+    recipe: Path, edits: Mapping[str, Any] | None = None, segment: Sequence[int] | None = None
+) -> dict[str, Any]:
     """Return the recipe's content, without its name, its folder, and its sources (see `sources`).
 
     Raises InputError when the recipe cannot be read, or a source is not text. edits: values that replace the recipe's;
-    for `elements` a factor, without effect on recipes that have none.
+    for `elements` a factor, without effect on recipes that have none. segment: of the rod, if not all of it.
     """
     table = read_toml(recipe)
     require_kind(table, recipe, RECIPE)
@@ -44,7 +44,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     sources(recipe)
-    return {"recipe": provenance.without(table | changes)}
+    return {"recipe": provenance.without(table | changes)} | ({"segment": list(segment)} if segment else {})
 
 
 def sources(recipe: Path, where: str = "") -> dict[str, str]:
@@ -63,14 +63,9 @@ def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = N
     check_cells(table.get("shape"), table.get("elements"), limits, recipe)
 
 
-def modules(recipe: Path) -> tuple[str, ...]:
-    """Return the module of the kind of body that a recipe describes."""
-    return (module_of(KINDS, kind_of(recipe), where=str(recipe)),)
-
-
 def kind_of(recipe: Path) -> str:
     """Return the name of the kind of body that a recipe describes."""
-    return str(import_module(KINDS).name_of(read_toml(recipe)))
+    return name_of(read_toml(recipe))
 
 
 def files(table: Mapping[str, Any], folder: Path) -> dict[str, Path]:
@@ -101,13 +96,13 @@ def in_recipe(error: InputError, path: Path) -> InputError:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Build the mesh (schema MESH or SOLID) as ``nc``, and for other programs as ``vtu``.
 
-    params: the recipe; its file; its folder, to which the paths of the files in it are relative.
+    params: the recipe; a segment of its rod; its file; its folder, to which the paths of the files in it are relative.
     """
     from flexclear.structure.kinds import kind
 
     folder = Path(params.get("folder", "."))
     try:
-        result = kind.build(params["recipe"], folder)
+        result = kind.build(params["recipe"], folder, segment=params.get("segment"))
     except InputError as error:
         raise in_recipe(error, Path(params.get("file", PLACE))) from None
     return {"nc": result, "vtu": kind.of_mesh(result).vtu(result)}

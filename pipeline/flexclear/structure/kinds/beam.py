@@ -13,7 +13,7 @@ from flexclear.structure.fe.beam import N_DOFS, Beam
 from flexclear.structure.fe.model import Drawn, Families, Interface, Model, SecondOrder, interfaces, selection
 from flexclear.structure.fe.section import Section, shape
 from flexclear.structure.fe.slices import integrate, slices
-from flexclear.structure.kinds.kind import Kind
+from flexclear.structure.kinds.interface import Kind
 
 #: components along the rod's axes by family; the first one decides the sign
 FAMILIES: dict[str, tuple[int, ...]] = {"bending_y": (1, 5), "bending_z": (2, 4), "torsion": (3,), "axial": (0,)}
@@ -109,6 +109,7 @@ KIND = Kind(
     vtu=beam_mesh.as_vtu,
     assemble=assemble,
     words=lambda model, families, vectors: [name.partition("_")[0] for name in families],
+    cut=beam_mesh.cut,
     exact=closed_form.columns,
     second_order=_second_order,
 )
