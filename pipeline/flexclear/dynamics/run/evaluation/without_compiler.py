@@ -14,11 +14,11 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
-from flexclear.dynamics.effects import INTEGRATORS, Parts
+from flexclear.dynamics.effects import Parts
+from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.run.evaluation.engine import Engine, assemble
-from flexclear.scene.registry import lookup
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class PythonEngine(Engine):
 
 def uncompiled(model: Model, mobility: Mobility) -> Engine:
     """Return an engine for the start of a model's run, without compilation."""
-    method = lookup(INTEGRATORS, model.scene.solver.integrator, where="[solver.integrator]")
+    method = METHODS[model.scene.solver.integrator]
     return assemble(model, Uncompiled({}, _kernels(model.parts)), method, mobility, PythonEngine)
 
 
