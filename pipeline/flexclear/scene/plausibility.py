@@ -52,7 +52,8 @@ def _pins(scene: Scene) -> Iterator[InputError]:
     for name, joint in scene.contacts().items():
         for key in ("pin_radius", "ball_radius", "length") if size > 0.0 else ():
             value = getattr(joint, key, None)
-            if value is not None and value > LARGE * size:
+            refused = joint.hollow and key != "length" and value is not None and value >= max(1.0, 15.0 * size)
+            if value is not None and value > LARGE * size and not refused:
                 text = f"{value:g} m is more than the size of the mechanism, {size:.3g} m"
                 yield warning(scene, f"joint.{name}.{key}", text, UNITS)
 
