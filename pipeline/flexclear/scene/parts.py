@@ -148,7 +148,7 @@ class RigidBody(Moving):
 class MasslessBody(RigidBody):
     """A body without mass and inertia, which only carries frames, such as those of two joints in a row."""
 
-    mass: Literal[0]  # type: ignore[assignment]
+    mass: Literal[0]
     """zero"""
 
 
