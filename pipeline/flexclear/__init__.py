@@ -25,6 +25,7 @@ __all__ = [
     "effects",
     "equilibrium",
     "exit_code",
+    "export",
     "frequencies",
     "load_scene",
     "new",
@@ -37,8 +38,10 @@ __all__ = [
     "sections",
     "sensitivities",
     "show",
+    "simulation",
     "stability",
     "stage",
+    "state_space",
     "sweep",
 ]
 

@@ -23,7 +23,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="folder to write to (default: the current one)",
     )
-    message = "a robot's file, URDF or MJCF, instead of KIND: flexclear new --from robot.urdf FOLDER"
+    message = "another program's file instead of KIND (URDF, MJCF, STEP): flexclear new --from robot.urdf FOLDER"
     parser.add_argument("--from", type=Path, dest="source", metavar="FILE", help=message)
 
 

@@ -1,4 +1,4 @@
-"""New scenes in a folder of the user's: from a template, or from a robot's file."""
+"""New scenes in a folder of the user's: from a template, or from the file of another program."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 from flexclear.artifacts.paths import PACKAGE
 from flexclear.scene.load import scene_of
+from flexclear.stages import cad_scene
 from flexclear.system.errors import InputError, ResourceError
 
 TEMPLATES = PACKAGE / "stages" / "templates"
@@ -30,11 +31,8 @@ def write(kind: str, folder: Path) -> list[Path]:
     return _write({source.name: source.read_bytes() for source in sources}, folder, f"flexclear new {kind} FOLDER")
 
 
-def write_from(source: Path, folder: Path) -> tuple[list[Path], list[str]]:
-    """Write the scene of a URDF or MJCF file, and the surfaces that it shows; return their paths, the scene first.
-
-    Returns also what is not taken over, a sentence each.  InputError where a file exists, or for no robot's file.
-    """
+def _of_robot(source: Path, folder: Path) -> tuple[dict[str, bytes], list[str]]:
+    """Return the scene of a URDF or MJCF file with the surfaces that it shows, and what is not taken over."""
     from flexclear.stages.robots.files import read
 
     robot = read(source)
@@ -46,7 +44,21 @@ def write_from(source: Path, folder: Path) -> tuple[list[Path], list[str]]:
         scene_of(tomllib.loads(text))
     except InputError as error:
         raise InputError(str(source), f"its scene would be wrong: {error}", "correct the robot's file") from None
-    files = {f"{stem}.toml": text.encode(), **surfaces}
+    return {f"{stem}.toml": text.encode(), **surfaces}, lost
+
+
+#: ending of another program's file -> function (file, folder) that returns a scene's files, and what these leave out
+SOURCES = {".urdf": _of_robot, ".xml": _of_robot, ".mjcf": _of_robot, ".step": cad_scene.files, ".stp": cad_scene.files}
+
+
+def write_from(source: Path, folder: Path) -> tuple[list[Path], list[str]]:
+    """Write the scene of another program's file, and the files that it needs; return their paths, the scene first.
+
+    Returns also what is not taken over, a sentence each.  InputError where a file exists, or for one of another kind.
+    """
+    if source.suffix.lower() not in SOURCES:
+        raise InputError(f"--from {source}", f"unknown ending '{source.suffix}'", f"known: {', '.join(SOURCES)}")
+    files, lost = SOURCES[source.suffix.lower()](source, folder)
     return _write(files, folder, f"flexclear new --from {source} FOLDER"), lost
 
 
