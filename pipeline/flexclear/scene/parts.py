@@ -146,10 +146,12 @@ class RigidBody(Moving):
 
 
 class MasslessBody(RigidBody):
-    """A body without mass and inertia, which only carries frames, such as those of two joints in a row."""
+    """A body that only carries frames, such as those of two joints in a row: ``mass = 0``, without inertia."""
 
     mass: Literal[0]
     """zero"""
+    inertia: Inertia
+    """zeros, [0, 0, 0]"""
 
 
 def _hertz(value: Any) -> float:
