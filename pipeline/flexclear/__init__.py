@@ -28,6 +28,7 @@ __all__ = [
     "export",
     "frequencies",
     "load_scene",
+    "new",
     "open",
     "plan",
     "quantity",

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from flexclear.scene import load
 from flexclear.scene.schema import Scene
-from flexclear.stages import formats, scenes
+from flexclear.stages import formats, new_scene, scenes
 from flexclear.stages import show as start_pose
 from flexclear.stages.graph import Graph
 from flexclear.stages.single_stage import Step, single_stage
@@ -65,6 +65,17 @@ def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
     0.2
     """
     return load.edited(scene, changes)
+
+
+def new(source: str | Path, folder: str | Path = ".") -> Path:
+    """Write a commented scene to start from into a folder and return its path.
+
+    source: a kind of mechanism, as ``flexclear new`` lists them, or a robot's file, URDF or MJCF; that needs the extra
+    ``robots``. The head of the scene lists what it does not take over.  Raises FlexclearError.
+    """
+    if source in new_scene.KINDS:
+        return new_scene.write(str(source), Path(folder))[0]
+    return new_scene.write_from(Path(source), Path(folder))[0][0]
 
 
 def run(scene: Scene | str | Path) -> xr.Dataset:

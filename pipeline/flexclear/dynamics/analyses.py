@@ -5,13 +5,15 @@ The keys of single runs do not depend on this module.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.artifacts.labelled import Labelled
+    from flexclear.dynamics.model.mobility import Mobility
+    from flexclear.dynamics.model.model import Model
     from flexclear.dynamics.record.cost import Cost
     from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
@@ -51,6 +53,30 @@ def require_without_events(scene: Scene, what: str) -> None:
     if scene.event:
         name = next(iter(scene.event))
         raise InputError(f"[event.{name}]", f"{what} needs a scene without events", 'remove them: remove = ["event"]')
+
+
+def start_refusals(scene: Scene, model: Model, mobility: Mobility) -> Iterator[Callable[[], object]]:
+    """Yield checks of the start of a scene's run, which raise its errors, without compilation.
+
+    Velocities, paths and surfaces at the start; then actuators, conditions of events and periods of sections.
+    model: of rigid bodies, at the start of the scene or of its ideal mechanism.
+    """
+    from flexclear.dynamics.run.evaluation.start import consistent_start
+    from flexclear.dynamics.run.evaluation.without_compiler import uncompiled
+
+    engine, states = uncompiled(model, mobility), []
+    yield lambda: states.append(consistent_start(engine))
+    if not states:
+        return
+    from flexclear.dynamics.events.phases import require_false
+    from flexclear.dynamics.record.sections import repeated
+    from flexclear.dynamics.run.inverse import enough
+
+    yield lambda: enough(engine, states[0])
+    if scene.event and (scene.start is None or scene.start.at is None):
+        yield lambda: require_false(scene, engine, states[0])
+    if scene.sections is not None:
+        yield lambda: repeated(engine, states[0])
 
 
 def equilibrium(

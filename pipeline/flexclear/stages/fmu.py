@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import shutil
 import socket
 import struct
@@ -25,6 +26,7 @@ from xml.etree import ElementTree
 
 from flexclear.artifacts.coordinates import AXES, QUATERNION
 from flexclear.artifacts.disk import publish
+from flexclear.artifacts.store import write_dataset
 from flexclear.scene.load import number_in
 from flexclear.scene.schema import Scene
 from flexclear.stages import stepping
@@ -66,7 +68,8 @@ def write(scene: Scene, target: Path, asked: Mapping[str, Any], workplace: Workp
         raise InputError("--format fmu", "is written on Linux, with its C compiler cc", "install gcc or clang")
     params, inputs = stepping.parts(scene, workplace)
     with stepping.of_parts(params, inputs) as sim:
-        listed = [*_inputs(sim), *_parameters(params, sim), *_outputs(scene, sim)]
+        listed = [Variable(name, "input", sim.inputs.unit(name), value) for name, value in sim.inputs.items()]
+        listed += [*_parameters(params, sim), *_outputs(scene, sim)]
     names = [one.name for one in listed]
     if len(set(names)) < len(names) or len(names) > MOST:
         raise InputError("--format fmu", f"{len(names)} variables, some of the same name or too many", "watch fewer")
@@ -75,9 +78,10 @@ def write(scene: Scene, target: Path, asked: Mapping[str, Any], workplace: Workp
     with tempfile.TemporaryDirectory() as folder:
         files = {"resources/scene.json": content.encode()}
         for name, data in inputs.items():
-            files[f"resources/{name.replace('/', '.')}.nc"] = _netcdf(data, Path(folder))
+            write_dataset(Path(folder) / "body.nc", data)
+            files[f"resources/{name.replace('/', '.')}.nc"] = (Path(folder) / "body.nc").read_bytes()
+        identifier = re.sub(r"\W", "_", f"fmu_{scene.name}", flags=re.ASCII)
         binary = _compiled(compiler, listed, token, standard, Path(folder))
-        identifier = _identifier(scene)
         files[f"binaries/{VERSIONS[standard]}/{identifier}.so"] = binary
         files["modelDescription.xml"] = _described(scene, identifier, listed, token, standard)
         packed = Path(folder) / "packed"
@@ -88,15 +92,6 @@ def write(scene: Scene, target: Path, asked: Mapping[str, Any], workplace: Workp
     counts = {kind: sum(one.causality == kind for one in listed) for kind in ("input", "parameter", "output")}
     said = ", ".join(f"{count} {kind}{'' if count == 1 else 's'}" for kind, count in counts.items())
     return f"wrote {target}: FMI {standard}.0, co-simulation, {said}; it runs with {sys.executable}"
-
-
-def _identifier(scene: Scene) -> str:
-    return "".join(c if c.isascii() and c.isalnum() else "_" for c in f"fmu_{scene.name}")
-
-
-def _inputs(sim: Simulation) -> Iterator[Variable]:
-    for name, value in sim.inputs.items():
-        yield Variable(name, "input", sim.inputs.unit(name), value)
 
 
 def _parameters(params: Mapping[str, Any], sim: Simulation) -> Iterator[Variable]:
@@ -138,18 +133,12 @@ def _outputs(scene: Scene, sim: Simulation) -> Iterator[Variable]:
                 yield Variable(name, "output", quantity.unit, quantity=quantity.name)
 
 
-def _netcdf(data: Any, folder: Path) -> bytes:
-    from flexclear.artifacts.store import write_dataset
-
-    write_dataset(folder / "body.nc", data)
-    return (folder / "body.nc").read_bytes()
-
-
 def _compiled(compiler: str, listed: list[Variable], token: str, standard: str, folder: Path) -> bytes:
     counts = [sum(one.causality == kind for one in listed) for kind in ("input", "parameter", "output")]
     starts = ", ".join(repr(one.start or 0.0) for one in listed)
     defined = [f"#define {name} {count}" for name, count in zip(("NU", "NP", "NY"), counts, strict=True)]
-    defined += [f"#define TOKEN {json.dumps(token)}", f"#define PYTHON {json.dumps(sys.executable)}"]
+    texts = {"TOKEN": token, "PYTHON": sys.executable}
+    defined += [f"#define {name} {json.dumps(text, ensure_ascii=False)}" for name, text in texts.items()]
     defined.append(f"static const double START[] = {{{starts}{', ' if starts else ''}0.0}};")
     (folder / "model.h").write_text("\n".join(defined) + "\n")
     library = folder / "model.so"
@@ -162,59 +151,39 @@ def _compiled(compiler: str, listed: list[Variable], token: str, standard: str, 
 
 def _described(scene: Scene, identifier: str, listed: list[Variable], token: str, standard: str) -> bytes:
     """Return modelDescription.xml."""
-    second, state = standard == "2", ("FMUstate" if standard == "2" else "FMUState")
-    can = {
-        f"canGetAndSet{state}": "true",
-        f"canSerialize{state}": "true",
-        "canHandleVariableCommunicationStepSize": "true",
-    }
-    root = ElementTree.Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": f"{standard}.0",
-            "modelName": scene.title,
-            ("guid" if second else "instantiationToken"): token,
-            "generationTool": f"flexclear {of_program()}",
-            "variableNamingConvention": "flat",
-        },
-    )
-    own = {"modelIdentifier": identifier, "needsExecutionTool": "true", **can}
-    ElementTree.SubElement(root, "CoSimulation", own | ({"canInterpolateInputs": "true"} if second else {}))
-    units = sorted({one.unit for one in listed} - {""})
-    if units:
-        parent = ElementTree.SubElement(root, "UnitDefinitions")
+    second, add = standard == "2", ElementTree.SubElement
+    state, token_name = ("FMUstate", "guid") if second else ("FMUState", "instantiationToken")
+    facts = {"fmiVersion": f"{standard}.0", "modelName": scene.title, token_name: token}
+    facts |= {"generationTool": f"flexclear {of_program()}", "variableNamingConvention": "flat"}
+    root = ElementTree.Element("fmiModelDescription", facts)
+    able = ["needsExecutionTool", f"canGetAndSet{state}", f"canSerialize{state}"]
+    able += ["canHandleVariableCommunicationStepSize", *(["canInterpolateInputs"] if second else [])]
+    add(root, "CoSimulation", {"modelIdentifier": identifier} | dict.fromkeys(able, "true"))
+    if units := sorted({one.unit for one in listed} - {""}):
+        parent = add(root, "UnitDefinitions")
         for unit in units:
-            ElementTree.SubElement(parent, "Unit", {"name": unit})
-    span = {"startTime": repr(scene.time.start), "stopTime": repr(scene.time.end)}
-    ElementTree.SubElement(root, "DefaultExperiment", span)
-    variables = ElementTree.SubElement(root, "ModelVariables")
+            add(parent, "Unit", {"name": unit})
+    add(root, "DefaultExperiment", {"startTime": repr(scene.time.start), "stopTime": repr(scene.time.end)})
+    variables = add(root, "ModelVariables")
     for k, one in enumerate(listed):
         fixed = {"variability": "fixed" if one.causality == "parameter" else "continuous"}
         common = {"name": one.name, "valueReference": str(k), "causality": one.causality, **fixed}
         typed = ({"unit": one.unit} if one.unit else {}) | ({} if one.start is None else {"start": repr(one.start)})
         if second:
             initial = {"output": "calculated", "parameter": "exact"}.get(one.causality)
-            variable = ElementTree.SubElement(
-                variables, "ScalarVariable", common | ({"initial": initial} if initial else {})
-            )
-            ElementTree.SubElement(variable, "Real", typed)
+            common |= {"initial": initial} if initial else {}
+            add(add(variables, "ScalarVariable", common), "Real", typed)
         else:
-            ElementTree.SubElement(variables, "Float64", common | typed)
+            add(variables, "Float64", common | typed)
     if not second:
         when = {"name": "time", "valueReference": str(len(listed)), "causality": "independent"}
-        ElementTree.SubElement(
-            variables, "Float64", {**when, "variability": "continuous", "unit": "s"} if "s" in units else when
-        )
-    structure = ElementTree.SubElement(root, "ModelStructure")
+        add(variables, "Float64", when | {"variability": "continuous"})
+    structure = add(root, "ModelStructure")
     outputs = [k for k, one in enumerate(listed) if one.causality == "output"]
-    if second and outputs:
-        for kind in ("Outputs", "InitialUnknowns"):
-            parent = ElementTree.SubElement(structure, kind)
-            for k in outputs:
-                ElementTree.SubElement(parent, "Unknown", {"index": str(k + 1)})
-    for kind in () if second else ("Output", "InitialUnknown"):
+    for kind in ("Output", "InitialUnknown") if outputs else ():
+        parent = add(structure, f"{kind}s") if second else structure
         for k in outputs:
-            ElementTree.SubElement(structure, kind, {"valueReference": str(k)})
+            add(parent, *(("Unknown", {"index": str(k + 1)}) if second else (kind, {"valueReference": str(k)})))
     ElementTree.indent(root)
     return ElementTree.tostring(root, "utf-8", xml_declaration=True)
 

@@ -283,12 +283,14 @@ def prepare(model: Model, progress: Progress) -> Engine:
     return assemble(model, entry, METHODS[solver.integrator], mobility)
 
 
-def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mobility) -> Engine:
-    """Return an engine with a new work array for a model whose functions are compiled."""
+def assemble(
+    model: Model, entry: functions.Entry, method: Method, mobility: Mobility, kind: type[Engine] = Engine
+) -> Engine:
+    """Return an engine of a kind with a new work array for a model whose functions are compiled."""
     space = model.arrays.work_space(method.room)
     entry.connect(space.h)
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    engine = Engine(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
+    engine = kind(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
     engine.reset()
     engine.connect()
     return engine
@@ -296,7 +298,7 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
 
 def another(engine: Engine) -> Engine:
     """Return a new engine of the same model, in the state before any run."""
-    made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
+    made = assemble(engine.model, engine.entry, engine.method, engine.mobility, type(engine))
     made.specialised.exact = engine.specialised.exact
     made.specialised.addresses = engine.specialised.addresses.copy()
     made.specialised.lists = engine.specialised.lists.copy()
