@@ -5,7 +5,7 @@ The keys of single runs do not depend on this module.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from flexclear.dynamics.model.mobility import Mobility
     from flexclear.dynamics.model.model import Model
     from flexclear.dynamics.record.cost import Cost
+    from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
     from flexclear.system.progress import Progress
 
@@ -114,3 +115,36 @@ def frequencies(
 
     bench, rest, small = balanced(scene, bundles, progress, time, drives, moving)
     return dataset.linear(bench, rest, small or vibrations(bench, rest.at), moving)
+
+
+def state_space(
+    scene: Scene,
+    bundles: Mapping[str, Labelled],
+    progress: Progress,
+    outputs: Sequence[Quantity],
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    held: bool = False,
+) -> xr.Dataset:
+    """Return the state space about the static equilibrium (schema STATE_SPACE); `equilibrium` has the same arguments.
+
+    outputs: those that the mechanism then has.  held: False where joints' drives become the forces that hold it there.
+    Raises InputError for a controller that samples, SolverError when no equilibrium is found.
+    """
+    from flexclear.dynamics.linear import dataset
+    from flexclear.dynamics.linear.bench import hold, state
+    from flexclear.dynamics.linear.equilibrium import balanced, newton
+    from flexclear.dynamics.linear.state_space import require_continuous, state_space
+    from flexclear.dynamics.starts.snapshot import posed, released
+
+    require_continuous(scene)
+    bench, rest, _ = balanced(scene, bundles, progress, time, drives)
+    moved = {name: drive for name, drive in scene.drive.items() if hasattr(drive, "joint")}
+    if moved and not held:
+        forces = dataset.equilibrium(bench, rest, moving=False)["drive_force"]
+        given = {name: float(forces.sel(drive=name)) for name in moved}
+        still = posed(scene, bench.engine, state(bench, rest.at.q), bench.time)
+        bench, q = hold(released(still, given), bundles, progress, bench.time, {}, moving=False)
+        rest = newton(bench, q)
+    owners = bench.scene.owners()
+    return state_space(bench, rest, [q for q in outputs if q.over_time and q.is_there(owners)])

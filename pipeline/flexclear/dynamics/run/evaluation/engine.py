@@ -24,6 +24,7 @@ from flexclear.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import start_errors
 from flexclear.dynamics.run import bushings, joint_friction
+from flexclear.dynamics.run.evaluation import table_ranges
 from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
     address,
@@ -240,8 +241,9 @@ class Engine:
         return self.view(m.LATCHED)
 
     def explained(self) -> str | None:
-        """Reason for which an effect ends the run; None when none does."""
-        reasons = (explain(self) for explain in self.model.parts.functions(EXPLANATIONS))
+        """Reason for which an effect, or a table, ends the run; None when none does."""
+        explains = [*self.model.parts.functions(EXPLANATIONS), table_ranges.explanation]
+        reasons = (explain(self) for explain in explains)
         return next((why for why in reasons if why is not None), None)
 
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
