@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
@@ -123,9 +123,25 @@ def integrate(
     judge: Judge | None = None,
     jumps: Jumps | None = None,
 ) -> Trajectory:
-    """Integrate from a consistent start. Raise SolverError when the stepper gives up.
+    """Integrate from a consistent start, to the end or until `stop`; arguments and errors as of `in_parts`."""
+    with stopping.heeded():
+        return next(in_parts(engine, y, progress, stop, left, outputs, judge, jumps))
 
-    stop: called periodically with the rows so far; True ends the run.
+
+def in_parts(
+    engine: Engine,
+    y: np.ndarray,
+    progress: Progress,
+    stop: Stop = never,
+    left: Handover | None = None,
+    outputs: np.ndarray | None = None,
+    judge: Judge | None = None,
+    jumps: Jumps | None = None,
+) -> Iterator[Trajectory]:
+    """Integrate from a consistent start; yield the trajectory so far whenever `stop` asks for it, and at the end.
+
+    The steps are the same whether it stops or not. Raise SolverError when the stepper gives up.
+    stop: called periodically with the rows so far.
     left: handover of another method, from which this one continues.
     outputs: times of output [s], the start first; by default the scene's.
     judge: decides whether another method continues; by default when an explicit one would take far too long.
@@ -136,24 +152,23 @@ def integrate(
     if outputs is None:
         outputs = engine.output_times(engine.model.scene.output.interval)
     stopping.check()  # many short integrations never pause
-    with stopping.heeded():
-        engine.specialised.rows.clear()
-        tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
-        engine.settle(progress)
-        tape.looks.append(look(engine))
-        sample, control = _sampler(engine), engine.control
-        for a, b in pairwise(engine.breaks):
-            if b <= control[m.TIME]:
-                continue
-            if a > begun:
-                engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-                if jumps is not None:
-                    jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
-            engine.select_pieces_after(0.5 * (a + b))
-            control[m.END], engine.n[m.FRESH] = b, 1
-            if _segment(engine, tape, progress, stop, judge, jumps):
-                break
-    return _collect(engine, tape)
+    engine.specialised.rows.clear()
+    tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
+    engine.settle(progress)
+    tape.looks.append(look(engine))
+    sample, control = _sampler(engine), engine.control
+    for a, b in pairwise(engine.breaks):
+        if b <= control[m.TIME]:
+            continue
+        if a > begun:
+            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
+            if jumps is not None:
+                jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
+        engine.select_pieces_after(0.5 * (a + b))
+        control[m.END], engine.n[m.FRESH] = b, 1
+        while _segment(engine, tape, progress, stop, judge, jumps):
+            yield _collect(engine, tape)
+    yield _collect(engine, tape)
 
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
