@@ -15,7 +15,6 @@ import xarray as xr
 from flexclear import dynamics
 from flexclear.artifacts import quantities
 from flexclear.artifacts.quantities import LASTING
-from flexclear.dynamics.record.single_run import SingleRun
 from flexclear.dynamics.run import progress_rate, trajectory
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
@@ -24,6 +23,7 @@ from flexclear.dynamics.run.horizon.horizon import Pair, PerturbedRun
 from flexclear.dynamics.run.progress_rate import DearError, affordable
 from flexclear.dynamics.run.run import engine_of, follow
 from flexclear.dynamics.run.trajectory import Followed, Stop
+from flexclear.dynamics.single_run import SingleRun
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError, StoppedError

@@ -30,9 +30,8 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     partial run marked as incomplete, when it is stopped.
     """
     from flexclear.artifacts.labelled import of
-    from flexclear.dynamics.effects import way
-    from flexclear.dynamics.record.single_run import SingleRun
     from flexclear.dynamics.run.progress_rate import DearError, affordable
+    from flexclear.dynamics.single_run import SingleRun
 
     def begun(edited: Scene, judges: Judges | None = None) -> SingleRun:
         return SingleRun(edited, bundles, progress, judges)
@@ -43,10 +42,12 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
             return begun(scene, affordable(scene)).whole()
         except DearError as dear:
             progress(None, str(dear))
-    accuracy = way(scene, "accuracy")
+    from flexclear.dynamics.run.method_choice import accuracy
+
     if not scene.by_need():
         return of(accuracy.deliver(scene, begun, progress))
-    method_costs = way(scene, "method selection")
+    from flexclear.dynamics.run.method_choice.method_selection import method_costs
+
     if requested:
         return of(accuracy.deliver(scene, begun, progress, method_costs(scene, bundles)))
     if scene.solver.by_need == "integrator":

@@ -99,6 +99,7 @@ def _task(
         run=f"flexclear.stages.effect_study:{stage}",
         params={"title": scene.title, "looser": integrated.looser, **watched, **outputs, **params},
         inputs={**inputs, **integrated.runs},
+        code=("flexclear.post",),
         folder=f"effects/{scene.name.replace('/', '_')}",
         names={"nc": f"{stage}.nc"},
     )

@@ -153,6 +153,7 @@ class Study:
                 "peers": list(self.peers),
             },
             inputs=inputs | self._ensembles,
+            code=("flexclear.post",),
             folder=f"cost/{self.scene.name}",
             names={"nc": "cost.nc"},
         )

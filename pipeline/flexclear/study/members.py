@@ -83,7 +83,7 @@ def point(design: Design, names: Sequence[str], compiled: Task, run: Task | None
         run="flexclear.stages.cost_point:run",
         params={"simulate": simulation.params(design.scene), "quantities": list(names)},
         inputs={**bundles(design), "kernels": compiled, **({} if run is None else {"run": run})},
-        modules=simulation.modules(design.scene),
+        code=("flexclear.stages.kernels", *simulation.CODE),
         exclusive=True,
     )
 

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 
 from flexclear.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.artifacts.schema import incomplete
-from flexclear.dynamics.effects import EVENTS
+from flexclear.dynamics.events import phases
 from flexclear.dynamics.record.dataset import recorded, warnings
 from flexclear.dynamics.run.progress_rate import Judges
 from flexclear.dynamics.run.run import Run, RunInParts
-from flexclear.scene.registry import lookup
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import Progress
 from flexclear.workflow import stopping
@@ -26,7 +25,7 @@ class SingleRun:
         self._progress = progress
         self._run: RunInParts | LabelledArrays
         if scene.event:
-            self._run = lookup(EVENTS, "phases", where="[event]")(scene, bundles, progress, judges)
+            self._run = phases.simulated(scene, bundles, progress, judges)
         else:
             self._run = RunInParts(scene, bundles, progress, judges)
 
