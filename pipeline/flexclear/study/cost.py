@@ -281,11 +281,10 @@ def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, d
 
     made: as `bring` returned it.  pictures: folder for them next to the page.
     """
-    from flexclear.post.cost.answer import Studied, advice
+    from flexclear.post.cost.answer import Studied, sentences
 
     path = f"{pictures}/{name.replace('/', '_')}_{FIGURE}.png"
-    paragraph = advice(made.dataset(), tables(made))
-    return Studied(name, paragraph, tables(made), {TITLE: path}), {path: f"{FIGURE}.png"}
+    return Studied(name, sentences(made.dataset()), tables(made), {TITLE: path}), {path: f"{FIGURE}.png"}
 
 
 def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> None:

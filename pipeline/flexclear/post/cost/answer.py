@@ -114,7 +114,7 @@ not.
 
 @dataclass(frozen=True, slots=True)
 class Studied:
-    """Section of the page on a scene: `advice`, tables (Markdown), pictures by title, relative to the page."""
+    """Section of the page on a scene: `advice` (`sentences`), tables (Markdown), pictures by title."""
 
     scene: str
     advice: str
@@ -136,48 +136,6 @@ def sections(scenes: tuple[Studied, ...]) -> str:
         parts += [f"![{title} of {s.scene}]({path})\n" for title, path in s.pictures.items()]
         parts += [table.rstrip() + "\n" for table in s.tables]
     return "\n".join(parts)
-
-
-def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
-    """Return one paragraph: cheapest way to each accuracy, cost of a digit, horizon."""
-    choices = {target: cheapest(study, target) for target in TARGETS}
-    met = {target: choice for target, choice in choices.items() if choice is not None}
-    text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in met.items())
-    parts = [f"{text}." if met else "No requested accuracy can be reached for all quantities; see the tables below."]
-    if met:
-        parts += [_digits(met)]
-    parts += [_some(study, target) for target in TARGETS if target not in met]
-    parts += [_horizon(study, tables)]
-    return " ".join(filter(None, parts))
-
-
-def _some(study: xr.Dataset, target: float) -> str:
-    """Return a sentence on the quantities that reach an accuracy which not all reach."""
-    names = [str(name) for name in study["quantity"].values]
-    able = [name for name in names if cheapest(study.sel(quantity=[name]), target) is not None]
-    unable = ", ".join(name for name in names if name not in able)
-    return (
-        f"{target:g} is possible for {', '.join(able)}, not for {unable}." if able else f"{target:g} is not possible."
-    )
-
-
-def _digits(met: Mapping[float, Choice]) -> str:
-    loose, tight = met[max(met)], met[min(met)]
-    digits = np.log10(max(met) / min(met))
-    if not digits > 0.0 or tight.seconds <= loose.seconds:
-        return ""
-    return f"Each further digit multiplies the time by {(tight.seconds / loose.seconds) ** (1.0 / digits):.2f}."
-
-
-def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
-    """Return advice for a run that cannot be predicted to its end."""
-    horizon, end = study.attrs["horizon"], study.attrs["end"]
-    if horizon == "none" or horizon >= end:
-        return ""
-    beyond = "the means of an ensemble (below), which more members improve and tighter tolerances do not"
-    if not any("Beyond the horizon" in table for table in tables):
-        beyond = "an ensemble, which the scene can request (`[ensemble]`)"
-    return f"All this holds up to t = {horizon:.3g} s of {end:.3g} s; beyond that use only {beyond}."
 
 
 TARGETS = (1e-3, 1e-6, 1e-9)
