@@ -9,6 +9,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
@@ -18,7 +19,8 @@ from flexclear.scene import lines
 from flexclear.scene.limits import Limits
 from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file
 from flexclear.scene.references import dangling
-from flexclear.scene.toml_files import read_toml, recipe_frames
+from flexclear.scene.segments import body_frames, cut
+from flexclear.scene.toml_files import read_toml
 from flexclear.scene.variants import ideal, loose
 from flexclear.stages import meshing, modal_analysis, scenes, show, simulation
 from flexclear.stages.graph import Graph
@@ -36,9 +38,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.dynamics.model.mechanism import Mechanism
+    from flexclear.dynamics.model.mobility import Mobility
+    from flexclear.dynamics.model.model import Model
     from flexclear.scene.parts import FlexibleBody
     from flexclear.scene.schema import Scene
-    from flexclear.structure.fe.model import Model
+    from flexclear.structure.fe import model as fe
 
 #: errors about a file: it is wrong, or asks for too much
 MISTAKES = (InputError, ResourceError)
@@ -46,6 +50,8 @@ MISTAKES = (InputError, ResourceError)
 LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
 #: extents of a mesh from a file outside of which its unit of length is doubted [m]
 SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
+#: the start of mechanisms with more free coordinates is checked by the run only
+MOST_COORDINATES = 60
 #: parts without which the start pose of a mechanism is another
 PLACING = ("[drive.", "[start.", "[gear.")
 #: number of unused frames that are listed
@@ -141,7 +147,7 @@ def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
 
 
 def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
-    findings.errors += dangling(compose(path), recipe_frames, str(path))
+    findings.attempt(lambda: refuse(dangling(cut(compose(path), str(path)), body_frames, str(path))))
     loaded: list[Scene] = []
     findings.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
     # bodies may share a recipe, which is meshed once
@@ -210,20 +216,20 @@ def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
 class Body:
     """A mesh without its modes.  rigid: mass, inertia and frames (schema RIGID).  interfaces: those of the recipe."""
 
-    model: Model
+    model: fe.Model
     rigid: xr.Dataset
     interfaces: tuple[str, ...]
 
 
 #: type of `meshed` as a function of a recipe's path
-MeshOf = Callable[[Path], tuple[Body | None, Findings]]
+MeshOf = Callable[..., tuple[Body | None, Findings]]
 
 
 def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
     """Check meshes and requested modes of a scene whose recipes can be read, then the mechanism that they form."""
     bodies: dict[str, Body] = {}
     for name, path in whole.recipes().items():
-        body, of_mesh = mesh_of(Path(path))
+        body, of_mesh = mesh_of(Path(path), segment=getattr(whole.body[name], "segment", None))
         findings.errors += of_mesh.errors
         findings.warnings += of_mesh.warnings
         bodies |= {name: body} if body is not None else {}
@@ -237,16 +243,21 @@ def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
         _free_motions(whole, rigid, findings)
 
 
-def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findings]:
-    """Return the body of a recipe if its mesh is allowed and takes seconds (else None), with errors and warnings."""
+def meshed(
+    path: Path, limits: Limits | None = None, segment: tuple[int, int] | None = None
+) -> tuple[Body | None, Findings]:
+    """Return the body of a recipe if its mesh is allowed and takes seconds (else None), with errors and warnings.
+
+    segment: of its rod; default: the whole.
+    """
     findings = Findings()
     made: list[Body] = []
     if findings.attempt(partial(meshing.check_size, path, limits or Limits())):
-        findings.attempt(lambda: made.extend(_meshed(path, findings)))
+        findings.attempt(lambda: made.extend(_meshed(path, segment, findings)))
     return (made[0] if made else None), findings
 
 
-def _meshed(path: Path, findings: Findings) -> Iterator[Body]:
+def _meshed(path: Path, segment: tuple[int, int] | None, findings: Findings) -> Iterator[Body]:
     from flexclear.structure.fe.recipe import parse
     from flexclear.structure.kinds import kind
     from flexclear.structure.modes import bundle
@@ -257,7 +268,7 @@ def _meshed(path: Path, findings: Findings) -> Iterator[Body]:
     if any(is_file(file) and file.stat().st_size > LARGEST_FILE for file in opened):
         return
     try:
-        mesh = kind.build(table, path.parent)
+        mesh = kind.build(table, path.parent, segment=segment)
     except InputError as error:
         raise meshing.in_recipe(error, path) from None
     findings.warnings += _unit(mesh, table, path)
@@ -310,15 +321,16 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
 
         model = tabulate(mechanism)
         mechanism, mobility = model.mechanism, analyse(model)
-        try:
+        with _as_mistakes():
             refuse_singular(model, mobility)
-        except SolverError as error:
-            raise InputError("[start]", str(error)) from None
     else:
         from flexclear.dynamics.model.assembly import assembled
 
         mechanism = assembled(mechanism)
-    refuse(start_errors(mechanism, final=whole.start is None or whole.start.at != "equilibrium"))
+    exact = whole.start is None or whole.start.at != "equilibrium"
+    refuse(start_errors(mechanism, final=exact))
+    if mechanism.all_rigid and sound and exact and model.nv <= MOST_COORDINATES:
+        _started(whole, model, mobility, findings)
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):
@@ -327,6 +339,23 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
         findings.notes.append(f"unused frames: {', '.join(unused[:LISTED_FRAMES])}{more}")
+
+
+@contextmanager
+def _as_mistakes() -> Iterator[None]:
+    """Turn errors that the run would meet at its start into errors of the scene."""
+    try:
+        yield
+    except SolverError as error:
+        raise InputError("[start]", str(error)) from None
+
+
+def _started(whole: Scene, model: Model, mobility: Mobility, findings: Findings) -> None:
+    """Check what the run refuses at its start, all of which is collected."""
+    from flexclear.dynamics.analyses import start_refusals
+
+    for check in start_refusals(whole, model, mobility):
+        findings.attempt(_as_mistakes()(check), whole.path)
 
 
 def _starts_ideal(whole: Scene) -> bool:

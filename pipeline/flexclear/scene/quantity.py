@@ -232,13 +232,16 @@ def read(
     owners: Mapping[str, Collection[str]],
     constants: Mapping[str, tuple[float, str]] | None = None,
     local: Mapping[str, Any] | None = None,
+    tables: Mapping[str, Any] | None = None,
 ) -> list[Any]:
     """Return an expression in postfix order (`scene.expression`); raise ValueError as `parse` does.
 
-    constants: value and SI unit of each. local: meanings of further names.
+    constants: value and SI unit of each. local: meanings of further names. tables: as of `postfix`.
     """
     known = local or {}
-    return postfix(_as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants)
+    return postfix(
+        _as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants, tables
+    )
 
 
 def _as_owned(text: str) -> str:
@@ -259,7 +262,17 @@ def _term(name: str, owners: Mapping[str, Collection[str]]) -> Quantity:
             raise ValueError(f"'{whole}' has no component '{component}'; vectors have x, y and z")
         turns = isinstance(known, Mapping) and bool(known[part])
         return Quantity(owner, key, component if whole != name else "", turns, "" if owner else word)
+    on_segment = _on_segment(owner, owners.get("frame", ()))
+    if on_segment != owner:
+        return _term(on_segment + name.removeprefix(owner), owners)
     raise ValueError(f"there is no quantity '{name}' in this scene ({_nearest(owner, word, owners)})")
+
+
+def _on_segment(frame: str, known: Collection[str]) -> str:
+    """Return ``rod_3.tip`` for the frame ``rod.tip`` of a rod in segments; other names as they are."""
+    body, _, own = frame.partition(".")
+    pattern = re.compile(rf"{re.escape(body)}_\d+\.{re.escape(own)}") if own else None
+    return next((name for name in known if pattern is not None and pattern.fullmatch(name)), frame)
 
 
 def _nearest(owner: str, word: str, owners: Mapping[str, Collection[str]]) -> str:

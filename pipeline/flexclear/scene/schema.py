@@ -242,11 +242,11 @@ class Scene(Part):
             except ValueError as error:
                 raise ValueError(f"{where}{name}: {error}") from None
 
-    def _stressed_bodies_are_flexible(self) -> None:
-        for name in self.output.stress or ():
+    def _recorded_bodies_are_flexible(self) -> None:
+        for key, name in ((key, name) for key, names in self.output.requests().items() for name in names):
             if name not in self.flexible():
                 known = ", ".join(self.flexible()) or "none"
-                raise ValueError(f"output.stress: '{name}' is not a flexible body of this scene; known: {known}")
+                raise ValueError(f"output.{key}: '{name}' is not a flexible body of this scene; known: {known}")
 
     @model_validator(mode="before")
     @classmethod
@@ -279,7 +279,7 @@ class Scene(Part):
         self._samples_can_be_made()
         self._quantities_are_there()
         check_formulas(self)
-        self._stressed_bodies_are_flexible()
+        self._recorded_bodies_are_flexible()
         require_possible(self)
 
     def by_need(self) -> bool:
@@ -341,6 +341,8 @@ class Scene(Part):
 
     _name: str = PrivateAttr(default="scene")
     _path: Path | None = PrivateAttr(default=None)
+    #: the table that the scene was read from, with rods that are cut into segments as one body
+    _whole: dict[str, Any] | None = PrivateAttr(default=None)
 
     @property
     def name(self) -> str:
@@ -386,6 +388,14 @@ class Scene(Part):
     def flexible(self) -> dict[str, FlexibleBody]:
         """Return the flexible bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
+
+    def rods(self) -> dict[str, list[str]]:
+        """Return the flexible bodies by name, of a rod in segments by the rod's: itself, or the segments."""
+        result: dict[str, list[str]] = {}
+        for name, body in self.flexible().items():
+            whole = name if body.segment is None else name.removesuffix(f"_{body.segment[0]}")
+            result.setdefault(whole, []).append(name)
+        return result
 
     def meshed(self) -> dict[str, MeshedRigidBody]:
         """Return the rigid bodies with mass, inertia and frames of a mesh recipe, by name."""

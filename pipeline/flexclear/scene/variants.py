@@ -39,7 +39,7 @@ EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
 KINDS = {"bushing": "bushing", "spring-damper": "spring", "joint-spring": "spring"}
 KINDS |= {"pid": "controller", "sampled-pid": "controller"}
 #: keys of a flexible body that a rigid one from the same recipe also has
-SHARED_KEYS = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
+SHARED_KEYS = ("mesh", "segment", "pose", "velocity", "angular_velocity", *UNSEEN)
 #: settings that follow the parts: quantities of removed parts are no longer requested or shown
 FOLLOWING = ("accuracy", "view", "ensemble")
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -70,7 +70,8 @@ class Effect:
 def effects(scene: Scene) -> tuple[Effect, ...]:
     """Return the removable effects of a scene, flexible bodies first, each followed by those that depend on it."""
     listed = list[Effect]()
-    for name, body in scene.flexible().items():
+    rods = scene.rods()
+    for name, body in ((name, scene.flexible()[pieces[0]]) for name, pieces in rods.items()):
         whole = Effect(f"body.{name}.modes", FLEXIBILITY)
         listed.append(whole)
         for key in ("damping", "stiffening"):
@@ -211,10 +212,10 @@ def _has(name: str, owners: dict[str, dict[str, bool]]) -> bool:
 
 
 def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
-    """Return edits of settings for removed flexible bodies: requested stresses, deformations at the start."""
+    """Return edits of settings for removed flexible bodies: what is recorded of them, deformations at the start."""
     rigid = {effect.owner for effect in gone if effect.kind == FLEXIBILITY}
     settings: dict[str, Any] = {}
-    if scene.output.stress is not None and rigid & set(scene.output.stress):
+    if any(rigid & set(names) for names in scene.output.requests().values()):
         settings["output"] = scene.output.without(rigid)
     if scene.start is not None and rigid & set(scene.start.modal):
         start = scene.start.model_dump(mode="json", exclude_none=True)
@@ -230,6 +231,10 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
         if effect.within in places:
             continue
         family, name = effect.name.split(".")[:2]
+        if family == "body" and name not in scene.body:
+            for piece in scene.rods()[name]:
+                changes |= _changes(scene, [replace(effect, name=effect.name.replace(name, piece, 1))])
+            continue
         part = getattr(scene, family)[name]
         if effect.joint:
             joint = name if name not in scene.joint else f"{name}_ideal"

@@ -28,7 +28,8 @@ from flexclear.scene.quantity import KINDS, parse
 from flexclear.scene.references import dangling
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
-from flexclear.scene.toml_files import read_toml, recipe_frames
+from flexclear.scene.segments import body_frames
+from flexclear.scene.toml_files import read_toml
 from flexclear.scene.units import quantity
 from flexclear.stages import export, simulation
 from flexclear.stages.derived_series import origins
@@ -186,17 +187,19 @@ def deficits(graph: Graph, workplace: Workplace) -> str:
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
-def linear(scene: Scene, time: float | None = None, workplace: Workplace | None = None, **pose: Any) -> xr.Dataset:
+def linear(
+    scene: Scene, time: float | None = None, workplace: Workplace | None = None, task: str = "linear", **pose: Any
+) -> xr.Dataset:
     """Return the equilibrium of a scene in one pose, and its natural vibrations; brought up to date as `run` is.
 
-    pose: as of `Graph.linear`.
+    task, pose: `Graph.linear` or `Graph.state_space`, and its arguments.
     """
     if time is not None and not scene.time.start <= time <= scene.time.end:
         raise InputError(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
-    task = Graph(scene, shown=as_in_its_file(scene)).linear(time, **pose)
-    return (workplace or open_workplace()).datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
+    made = getattr(Graph(scene, shown=as_in_its_file(scene)), task)(time, **pose)
+    return (workplace or open_workplace()).datasets(made)[0].assign_attrs(title=scene.title, scene=scene.name)
 
 
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
@@ -333,7 +336,7 @@ def require_names(scene: Scene) -> None:
     """Raise InputErrors for dangling names in a scene, before any mesh or mode is computed for it."""
     table = scene.model_dump(mode="python", exclude_none=True)
     where = str(scene.path or scene.name)
-    refuse([*dangling(table, recipe_frames, where), *unrecorded(scene)])
+    refuse([*dangling(table, body_frames, where), *unrecorded(scene)])
 
 
 def unrecorded(scene: Scene) -> Iterator[InputError]:

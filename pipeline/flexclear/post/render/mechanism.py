@@ -102,7 +102,8 @@ def mechanism(
 
     stressed: True colours flexible bodies by von Mises stress.  InputError for a run that records none.
     """
-    looks, at = looks or Looks(), Layout(run, parameters(run), bundles)
+    looks = looks or Looks()
+    at = Layout(run, shown_parts(parameters(run), looks), bundles)
     if stressed and not body_shape.stress_recorded(run):
         problem = "the run records no von Mises stress"
         raise InputError(
@@ -120,6 +121,21 @@ def mechanism(
     top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
     shown = cloud(run, parts, flexible, samples(run))
     return Mechanism(run, parts, flexible, chosen_view, size, shown, looks, top)
+
+
+def shown_parts(text: Mapping[str, Any], looks: Looks) -> dict[str, Any]:
+    """Return the parts of a scene without bodies of no shape that carry nothing, and without what acts on them."""
+    sides = [{frame.partition(".")[0] for frame in one["between"]} for one in text.get("joint", {}).values()]
+    unshaped = {name for name, look in looks.bodies.items() if not look.get("geometry", True)}
+    without = {name for name in unshaped if sum(name in both for both in sides) == 1}
+    bearings = {name for name, both in zip(text.get("joint", ()), sides, strict=True) if not without.isdisjoint(both)}
+
+    def drawn(name: str, part: Any) -> bool:
+        ends = [*part.get("between", ()), *(str(part.get(key, "")) for key in ("joint", "first", "second", "frame"))]
+        return name not in without and (without | bearings).isdisjoint(end.partition(".")[0] for end in ends)
+
+    families = {"body", "joint", "drive", "load", "stop", "gear"} if without else set()
+    return {key: {n: p for n, p in one.items() if drawn(n, p)} if key in families else one for key, one in text.items()}
 
 
 def cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible], steps: Sequence[int]) -> np.ndarray:
@@ -195,11 +211,17 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
         elif "inertia" in body:
             com, inertia = at.centre(name), np.array(body["inertia"])
             key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
+            key = (rod_of(name, body),) if "segment" in body else key
             color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
-            solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
+            solid = equivalent(body["mass"], inertia) if np.any(inertia) and body["mass"] else None
             drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
             if len(drawn.points):
                 yield Part(owner, surfaces.moved(drawn, -com), color)
+
+
+def rod_of(name: str, body: Mapping[str, Any]) -> str:
+    """Return the name of the rod of which a body is a segment; its own name for a whole body."""
+    return name.removesuffix(f"_{body['segment'][0]}") if "segment" in body else name
 
 
 def _with_wheels(
@@ -276,7 +298,9 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, s
     columns = np.flatnonzero(run.mode_body.values == name)
     q = run.modal_coordinate.values[:, columns]
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
-    scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
+    fitting = max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
+    in_segments = "segment" in parameters(run)["body"][name]  # these fit together only as they are
+    scale = 1.0 if in_segments else looks.exaggeration or fitting
     color = looks.bodies.get(name, {}).get("color")
     shown = stressed and name in body_shape.stress_recorded(run)
     if stressed:  # grey does not look like a stress
