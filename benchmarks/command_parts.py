@@ -25,9 +25,8 @@ PARTS: Mapping[str, Mapping[str, str]] = {
     "flexclear.artifacts.store": {"Store.find": "keys", "_written": "writing"},
     f"{_RUN}.run.evaluation.engine": {"prepare": "assembling"},
     f"{_RUN}.model.model": {"tabulate": "assembling"},
-    f"{_RUN}.run.trajectory": {"integrate": "integrating"},
     f"{_RUN}.run.horizon.horizon": {"Pair.perturbed_run": "integrating"},
-    f"{_RUN}.run.run": {"observed": "recording"},
+    f"{_RUN}.run.run": {"RunInParts._advanced": "integrating", "observed": "recording"},
     f"{_RUN}.record.dataset": {"recorded": "recording"},
     "flexclear.post.single_run.series": {"derived": "deriving"},
 }

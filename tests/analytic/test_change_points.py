@@ -12,7 +12,7 @@ import xarray as xr
 from flexclear import dynamics
 from flexclear.dynamics.record.dataset import recorded
 from flexclear.dynamics.run.progress_rate import Judge, Judges
-from flexclear.dynamics.run.run import integrate, integrate_until_stopped
+from flexclear.dynamics.run.run import RunInParts, integrate
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError, SolverError
@@ -115,7 +115,7 @@ def test_passes_stay_recorded_when_another_method_takes_over() -> None:
     table = cp.four_bar(1.5, 1.0, time={"end": 2.0}, output={"interval": 0.1 * first}, solver={"rtol": 1e-10})
     scene = Scene.model_validate(cp.driven(table, "A", cp.steady(1.5, 4.0)))
     panel = {"dop853": (Judge(50, lambda engine, looks: "so" if looks[-1].time > first + 0.1 else ""), "radau")}
-    run = integrate_until_stopped(scene, {}, silent, Judges(panel, panel))
+    run = RunInParts(scene, {}, silent, Judges(panel, panel)).whole()
     assert run.model.scene.solver.integrator == "radau"
     # the pose is where closures depend on each other, which is known to the square root of what they are open
     assert [one.time for one in run.trajectory.passes] == pytest.approx([first, first + 0.5 * np.pi], abs=1e-6)

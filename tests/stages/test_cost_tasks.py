@@ -19,10 +19,10 @@ from flexclear.post.cost.answer import sentences
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
-from flexclear.stages import graph, scenes, simulation
+from flexclear.stages import scenes, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, open_workplace
-from flexclear.study import cost, cost_design
+from flexclear.study import cost, cost_design, members
 from flexclear.study.cost_design import Setting
 from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
@@ -190,13 +190,32 @@ def test_the_limit_of_a_trial_run_is_not_called_the_scenes(
     tmp_path: Path, fresh: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ):
     """The run at a tighter tolerance, which determines the error of a compared run, has a limit of its own."""
-    monkeypatch.setattr(graph, "FEWEST_EVALUATIONS", 1)
-    monkeypatch.setattr(graph, "TIGHTER_EVALUATIONS", 1)
+    monkeypatch.setattr(members, "FEWEST_EVALUATIONS", 1)
+    monkeypatch.setattr(members, "TIGHTER_EVALUATIONS", 1)
     one = write("pendulum", tmp_path)[0]
     other = one.with_name("heavy.toml")
     other.write_text(one.read_text().replace('mass = "1 kg"', 'mass = "2 kg"'))
     said = command("compare", one, other, "--jobs", "1").err
     assert "evaluations is reached (a trial run's own limit, not the scene's [solver.evaluations])" in said
+
+
+def test_what_two_studies_need_is_one_run(swing: Scene, place: Workplace, study: cost.Study):
+    """The run at a tenth of the tolerance is a point of the costs and the error of comparisons and effects."""
+    tighter = members.tighter(swing, members.setting_of(swing, place))
+    assert tighter is not None
+    tasks = tighter, study.runs["dop853, rtol 1e-07"], members.integrated(swing, study.setting).runs["tight"]
+    assert len({made.record.key for made in place.made(*tasks)}) == 1
+    (kept,) = place.datasets(study.runs["as it is"])
+    own = scenes.run(swing, place)
+    assert kept["position"].identical(own["position"].sel(body=kept["body"]))
+
+
+def test_members_that_run_at_a_looser_tolerance_err_as_much_more(csj: Scene):
+    """In proportion to their tolerance, which is tighter than necessary in the scene's own run."""
+    own = Setting("dop853", 1e-9)
+    assert members.integrated(csj, own).looser == pytest.approx(members.MEANS / 1e-9)
+    assert members.integrated(csj, own, tight=True).looser == 1.0
+    assert members.integrated(csj, Setting("rk4", 1e-10, 1e-5)).looser == 1.0
 
 
 def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, command: Command):

@@ -20,8 +20,10 @@ from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.horizon import horizon
 from flexclear.dynamics.run.horizon.horizon import Pair, PerturbedRun
+from flexclear.dynamics.run.progress_rate import DearError, affordable
 from flexclear.dynamics.run.run import engine_of, follow
 from flexclear.dynamics.run.trajectory import Followed, Stop
+from flexclear.dynamics.single_run import SingleRun
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError, StoppedError
@@ -75,12 +77,41 @@ def test_without_a_horizon_the_run_is_integrated_once(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.usefixtures("parting")
+@pytest.mark.parametrize("ends", [(0.2,), (0.1, 0.4), (2.0,)])
+def test_a_run_that_is_looked_at_on_its_way_is_the_same(ends: tuple[float, ...]) -> None:
+    """To the last bit, whether it pauses or not; what is seen on the way is its beginning."""
+    scene = check("clearance_slider_crank")
+    at_once = dynamics.simulate(scene, {}, silent)
+    parts, span = SingleRun(scene, {}, silent), scene.time.end - scene.time.start
+    for end in ends:
+        seen = parts.until(scene.time.start + end * span).to_xarray()
+        assert "horizon" not in seen
+        assert (float(seen["time"][-1]) < scene.time.end) is (end < 1.0)
+        assert float(seen["time"][-1]) >= scene.time.start + min(end, 1.0) * span
+        xr.testing.assert_equal(seen["position"], at_once["position"].isel(time=slice(seen.sizes["time"])))
+    xr.testing.assert_identical(parts.whole().to_xarray(), at_once)
+
+
+@pytest.mark.usefixtures("parting", "two")
+def test_the_twin_of_a_run_that_is_given_up_does_not_begin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Too dear a run is noticed after its trial."""
+    monkeypatch.setattr(progress_rate, "AFFORDABLE", 500)
+    monkeypatch.setattr(progress_rate, "EARLIEST", 200)
+    begun = list[str]()
+    monkeypatch.setattr(horizon, "moved_start", lambda *_: begun.append("twin"))
+    scene = check("clearance_slider_crank", **{"solver.by_need": True})
+    with pytest.raises(DearError):
+        SingleRun(scene, {}, silent, affordable(scene)).whole()
+    assert not begun
+
+
+@pytest.mark.usefixtures("parting")
 def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody, the run, and the twin."""
     scene = check("clearance_slider_crank")
     expected = alone(scene, monkeypatch)
     assert float(expected.horizon) < 0.5 * scene.time.end
-    hear, enough = Pair._store_rows, Pair._enough
+    hear, enough = Pair.store_rows, Pair._enough
 
     def late_run(self: Pair, rows: np.ndarray) -> bool:
         time.sleep(3e-3)  # the twin takes a tenth of that between two looks
@@ -90,7 +121,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(monkeypatc
         assert self._ended.wait(PATIENCE)
         return enough(self, twin, alive)
 
-    for late in ({}, {"_enough": late_twin}, {"_store_rows": late_run}):
+    for late in ({}, {"_enough": late_twin}, {"store_rows": late_run}):
         with monkeypatch.context() as patch:
             for name, slow in late.items():
                 patch.setattr(Pair, name, slow)

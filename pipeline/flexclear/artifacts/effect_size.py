@@ -11,12 +11,12 @@ over a twentieth of the series around t: a few separated members agree at some o
 outputs would look like differences. Without spread d is the distance of the two motions.
 
 Up to the horizon, where the members of both variants are one motion each, the difference is not one of statistics:
-`predictable_outputs`, `predictable_difference`.
+`early_changes`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -198,6 +198,35 @@ def predictable_outputs(points: Sequence[Point], chosen: Sequence[Quantity], ful
                 first = separated_from(np.linspace(0.0, 1.0, len(separation)), separation, 1.0)
                 outputs += [] if first is None else [first if first > 1 else 0]
     return min(outputs, default=None)
+
+
+def change(without: Point, full: Point, quantity: Quantity, members: int) -> Influence:
+    """Return the `influence` of what a variant lacks on the full scene; nan where one of them was refused."""
+    refused = without.refused or full.refused
+    return Influence(np.nan, np.nan) if refused else influence(without, full, quantity, members)
+
+
+def early_changes(
+    without: Point,
+    full: Point,
+    chosen: Sequence[Quantity],
+    members: int,
+    times: Sequence[float],
+    error: Callable[[Quantity, float], float],
+) -> tuple[float, list[Influence]]:
+    """Return the time [s] up to which all members of both points are one motion each, and the changes up to it.
+
+    The time is nan, and the changes are those of the whole run, where they always are; changes are nan where they never
+    are, and where a point was refused. times: of the outputs [s].  error: of the time integration of a run in a
+    quantity, up to a time [s].
+    """
+    outputs = 0 if without.refused or full.refused else predictable_outputs((without, full), chosen, full)
+    horizon = float(times[outputs - 1]) if outputs and len(times) else np.nan
+    until = np.inf if outputs is None else horizon
+    return horizon, [
+        predictable_difference(without, full, q, members, outputs, 2.0 * error(q, until) if outputs != 0 else 0.0)
+        for q in chosen
+    ]
 
 
 def predictable_difference(

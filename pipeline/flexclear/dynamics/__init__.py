@@ -30,41 +30,26 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     partial run marked as incomplete, when it is stopped.
     """
     from flexclear.artifacts.labelled import of
-    from flexclear.artifacts.schema import incomplete
-    from flexclear.dynamics.record.dataset import recorded, warnings
     from flexclear.dynamics.run.progress_rate import DearError, affordable
-    from flexclear.dynamics.run.run import integrate_until_stopped
-    from flexclear.workflow import stopping
+    from flexclear.dynamics.single_run import SingleRun
 
-    def once(edited: Scene, judges: Judges | None = None, *, alone: bool = False) -> LabelledArrays:
-        if edited.event:
-            from flexclear.dynamics.events import phases
-
-            return phases.simulated(edited, bundles, progress, judges)
-        done = integrate_until_stopped(edited, bundles, progress, judges, alone=alone)
-        if done.stopped:
-            raise stopping.error(done.stopped, incomplete(recorded(done), done.stopped))
-        for sentence in warnings(done):
-            progress(None, f"warning: {sentence}")
-        return recorded(done)
+    def begun(edited: Scene, judges: Judges | None = None) -> SingleRun:
+        return SingleRun(edited, bundles, progress, judges)
 
     requested = scene.accuracy is not None and scene.accuracy.quantities
     if not requested:
         try:
-            return once(scene, affordable(scene))
+            return begun(scene, affordable(scene)).whole()
         except DearError as dear:
             progress(None, str(dear))
     from flexclear.dynamics.run.method_choice import accuracy
 
-    def compared(edited: Scene, judges: Judges | None = None, *, alone: bool = False) -> xr.Dataset:
-        return once(edited, judges, alone=alone).to_xarray()
-
     if not scene.by_need():
-        return of(accuracy.deliver(scene, compared, progress))
+        return of(accuracy.deliver(scene, begun, progress))
     from flexclear.dynamics.run.method_choice.method_selection import method_costs
 
     if requested:
-        return of(accuracy.deliver(scene, compared, progress, method_costs(scene, bundles)))
+        return of(accuracy.deliver(scene, begun, progress, method_costs(scene, bundles)))
     if scene.solver.by_need == "integrator":
-        return of(accuracy.at_tolerance(scene, compared, method_costs(scene, bundles)))
-    return of(accuracy.by_default(scene, compared, progress, lambda edited: method_costs(edited, bundles)))
+        return of(accuracy.at_tolerance(scene, begun, method_costs(scene, bundles)))
+    return of(accuracy.by_default(scene, begun, progress, lambda edited: method_costs(edited, bundles)))

@@ -20,14 +20,12 @@ if TYPE_CHECKING:
     from flexclear.system.progress import Progress
 
 
-def cost(
-    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, *, checked: bool = True, brief: bool = False
-) -> Cost:
+def cost(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, *, checked: bool = True) -> Cost:
     """Run a scene once and measure the costs of integration and recording (`dynamics.record.cost.measure`)."""
     from flexclear.dynamics.record.cost import measure
 
     require_without_events(scene, "the cost of a run")
-    return measure(scene, bundles, progress, checked=checked, brief=brief)
+    return measure(scene, bundles, progress, checked=checked)
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:

@@ -12,10 +12,10 @@ import numpy as np
 import xarray as xr
 
 from flexclear.artifacts import quantities
-from flexclear.dynamics import analyses
+from flexclear.dynamics import analyses, simulate
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
-from flexclear.stages.kernels import warm
+from flexclear.stages.kernels import processor_time, warm
 from flexclear.stages.simulation import bundles, rebuild
 from flexclear.system.errors import SolverError
 from flexclear.system.platforms import peak_memory
@@ -26,26 +26,31 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """Run the scene; return the recorded quantities, ``cpu_repeat(repeat)`` of the integration, and other costs as
     attributes, among them the median time of the recording.
 
-    params: `simulate`, the parameters of the simulate stage; `quantities` of the study; `brief`, as in `analyses.cost`.
-    inputs: bundles, and `kernels`, the artifact of `stages.kernels`. Where the solver refuses the run, the dataset is
+    params: `simulate`, the parameters of the simulate stage, and names of `quantities`.  inputs: bundles; `kernels`,
+    the artifact of `stages.kernels`; `run`, the same run, where it is known, whose horizon is then kept as well.  With
+    events, whose phases begin anew, all work of the run is measured.  Where the solver refuses the run, the dataset is
     empty and its attribute `refused` holds the reason: that, too, is a result of the study.
     """
     scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
-    warm(scene, reduced, progress)
+    begun = processor_time()
     try:
-        cost = analyses.cost(scene, reduced, progress, brief=params["brief"])
+        if scene.event:
+            done, integration, recording = simulate(scene, reduced, progress), [processor_time() - begun], [0.0]
+        else:
+            warm(scene, reduced, progress)
+            cost = analyses.cost(scene, reduced, progress)
+            done, integration, recording = cost.run, [*cost.integration], [*cost.recording]
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
-    done = cost.run
-    chosen = [parse(name, scene.owners()) for name in params["quantities"]]
-    recorded = quantities.keep(done, chosen)
+    kept = inputs.get("run", done)
+    recorded = quantities.keep(kept, [parse(name, scene.owners()) for name in params["quantities"]])
     attributes = {"units": "s", "long_name": "processor time of the integration of a warm run"}
-    recorded["cpu_repeat"] = (("repeat",), list(cost.integration), attributes)
+    recorded["cpu_repeat"] = (("repeat",), integration, attributes)
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
-    costs["recording_seconds"] = float(np.median(cost.recording))
+    costs["recording_seconds"] = float(np.median(recording))
     costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]
-    return {"nc": recorded.assign_attrs(**costs, **_growth(done), **_contacts(scene))}
+    return {"nc": recorded.assign_attrs(**costs, **_growth(kept), **_contacts(scene))}
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

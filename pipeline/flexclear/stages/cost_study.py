@@ -50,9 +50,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
     result |= files("price", answer.price_list(study, f"What accuracy costs: {title}", notes))
-    result |= files("quantities", answer.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
-    result |= answer.figure("accuracy", study, f"What accuracy costs: {title}")
     marks = _marks(points, runs, chosen)
     result |= work_precision.make(
         "work_precision", study, f"Error against cost: {title}", marks, work_precision.peers(study, params["peers"])

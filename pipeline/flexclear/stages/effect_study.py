@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from flexclear.post.plotting.table import files
@@ -21,6 +22,18 @@ if TYPE_CHECKING:
 Names = frozenset[str]
 
 
+@dataclass(frozen=True)
+class Integrated:
+    """Runs whose distance is the error of the time integration of members.
+
+    runs: ``own``, the scene's, and ``tight``, at a tighter tolerance (`stages.cost_point`); empty without one.
+    looser: the members' tolerance as a multiple of the scene's, to which their errors are proportional.
+    """
+
+    runs: Mapping[str, Task]
+    looser: float = 1.0
+
+
 def task(
     scene: Scene,
     effects: Sequence[Effect],
@@ -28,6 +41,7 @@ def task(
     variants: Mapping[Names, Scene],
     watched: Mapping[Hashable, Sequence[Task]],
     members: int,
+    integrated: Integrated,
 ) -> Task:
     """Return the task of all effect sizes. variants, watched: scenes and their tasks, by the effects that they lack."""
     params = {
@@ -38,7 +52,7 @@ def task(
         "staying": _staying(scene, [effect.name for effect in effects]),
     }
     inputs = {f"variant{k}/{n}": one for k, gone in enumerate(variants) for n, one in enumerate(watched[gone])}
-    return _task("effects", scene, chosen, params, inputs)
+    return _task("effects", scene, chosen, params, inputs, integrated)
 
 
 def ranking(
@@ -49,13 +63,13 @@ def ranking(
     tasks: Mapping[Hashable, Sequence[Task]],
     pairs: Mapping[str, int],
     undone: Sequence[str],
-    integrated: Sequence[Task] = (),
+    integrated: Integrated,
 ) -> Task:
     """Return the task that ranks the effects, each removed alone.
 
     words: description of each effect. variants: the scene without each effect, by its name (the full scene by the empty
     name). tasks: their tasks by name (`stages.watched_quantities`). pairs: number of members with which each effect is
-    compared. integrated: the scene's run and one at a tighter tolerance (`stages.cost_point`).
+    compared.
     """
     params = {
         "words": dict(words),
@@ -65,12 +79,16 @@ def ranking(
         "staying": _staying(scene, pairs),
     }
     inputs = {f"{name}/{n}": one for name in ("", *pairs) for n, one in enumerate(tasks[name])}
-    inputs |= dict(zip(("own", "tight"), integrated, strict=False))
-    return _task("effect_ranking", scene, chosen, params, inputs)
+    return _task("effect_ranking", scene, chosen, params, inputs, integrated)
 
 
 def _task(
-    stage: str, scene: Scene, chosen: Sequence[Quantity], params: Mapping[str, Any], inputs: Mapping[str, Task]
+    stage: str,
+    scene: Scene,
+    chosen: Sequence[Quantity],
+    params: Mapping[str, Any],
+    inputs: Mapping[str, Task],
+    integrated: Integrated,
 ) -> Task:
     """Return a task of this module. stage: name of the function to call and of its files."""
     watched = {"quantities": [q.written() for q in chosen], "units": [q.unit for q in chosen]}
@@ -79,8 +97,8 @@ def _task(
         stage=stage,
         scene=scene.name,
         run=f"flexclear.stages.effect_study:{stage}",
-        params={"title": scene.title, **watched, **outputs, **params},
-        inputs=inputs,
+        params={"title": scene.title, "looser": integrated.looser, **watched, **outputs, **params},
+        inputs={**inputs, **integrated.runs},
         code=("flexclear.post",),
         folder=f"effects/{scene.name.replace('/', '_')}",
         names={"nc": f"{stage}.nc"},
@@ -98,7 +116,7 @@ def _owners(scene: Scene) -> dict[str, list[str]]:
 
 def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Assemble ``effects.nc``, its table and its chart. params: see `task`. inputs: ``variant<k>/<n>``, as in
-    `watched_quantities`."""
+    `watched_quantities`, and those of `Integrated`."""
     from flexclear.post.answers import effect_sizes
 
     all_effects = [Effect(*text) for text in params["effects"]]
@@ -108,8 +126,8 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
         for k, gone in enumerate(params["variants"])
     }
     progress(None, "comparing")
-    times = _times(params["outputs"], inputs)
-    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"], times)
+    times, error = _times(params["outputs"], inputs), _error_of(params, inputs)
+    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"], times, error)
     dataset.attrs["staying"] = effect_sizes.stay(params["staying"])
     result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
     return result | effect_sizes.chart("effects", dataset, f"Effect sizes: {params['title']}")
@@ -141,10 +159,22 @@ def _times(outputs: Sequence[float], inputs: Mapping[str, xr.Dataset]) -> list[f
     ]
 
 
-def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``effect_ranking.nc``, table and chart. params: see `ranking`. inputs: ``<effect>/<n>``, and where
-    they exist ``own`` and ``tight``, whose difference is the error of the time integration."""
+def _error_of(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Callable[[Quantity, float], float]:
+    """Return the function that estimates the error of a member's time integration in a quantity up to a time [s]."""
     from flexclear.artifacts import quantities
+
+    def error(quantity: Quantity, until: float) -> float:
+        own, tight = inputs.get("own"), inputs.get("tight")
+        if own is None or tight is None or not quantities.has(own, quantity) or not quantities.has(tight, quantity):
+            return 0.0
+        return float(params["looser"]) * quantities.error(own, tight, quantity, until)
+
+    return error
+
+
+def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Assemble ``effect_ranking.nc``, table and chart. params: see `ranking`. inputs: ``<effect>/<n>``, and
+    those of `Integrated`."""
     from flexclear.post.answers import effect_ranking as ranked
     from flexclear.post.answers import effect_sizes
 
@@ -155,13 +185,7 @@ def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], 
 
     pairs = {name: ranked.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
 
-    def error(quantity: Quantity, until: float) -> float:
-        own, tight = inputs.get("own"), inputs.get("tight")
-        if own is None or tight is None or not quantities.has(own, quantity) or not quantities.has(tight, quantity):
-            return 0.0
-        return quantities.error(own, tight, quantity, until)
-
-    times = _times(params["outputs"], inputs)
+    times, error = _times(params["outputs"], inputs), _error_of(params, inputs)
     results = ranked.assemble(pairs, params["words"], chosen, params["units"], params["undone"], times, error)
     results.attrs["staying"] = effect_sizes.stay(params["staying"])
     result: dict[str, Any] = {"nc": results} | files("effect_ranking", ranked.table(results))

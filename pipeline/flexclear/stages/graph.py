@@ -12,7 +12,6 @@ from flexclear.scene.limits import require_scatter
 from flexclear.scene.load import edited, number_in, with_number
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
-from flexclear.scene.solver import of_run
 from flexclear.scene.toml_files import read_toml
 from flexclear.stages import (
     derived_series,
@@ -40,8 +39,6 @@ CODE |= {"rendering": ("flexclear.stages.simulation", *POST)}
 TIGHTER, FINER = 1e-2, 4
 #: tightest useful tolerance: below it, rounding dominates the error
 TIGHTEST = 1e-13
-#: evaluations allowed to a comparison run: a multiple of those of the compared run, and at least the second number
-TIGHTER_EVALUATIONS, FEWEST_EVALUATIONS = 4, 100_000
 
 
 @dataclass(frozen=True)
@@ -254,30 +251,13 @@ class Graph:
     @cached_property
     def tight(self) -> Task:
         """Task of the same run at a tighter tolerance, or at half of a fixed step, which determines the run's error."""
-        return self._tighter(self.scene.solver.integrator, self.scene.solver.rtol, {"accuracy": None})
-
-    def tighter(self, run: Mapping[str, Any]) -> Task:
-        """Return task `tight` for a run with these attributes, limited to a multiple of the run's evaluations."""
         solver = self.scene.solver
-        most = min(max(TIGHTER_EVALUATIONS * int(run["evaluations"]), FEWEST_EVALUATIONS), solver.evaluations)
-        change = {"solver.evaluations": most, "accuracy": None}
-        return self._tighter(*of_run(solver, self.scene.by_need(), run), change)
-
-    def _tighter(self, integrator: str, rtol: float, limits: Mapping[str, object]) -> Task:
-        solver, change = self.scene.solver, dict(limits)
-        if solver.step is None:
-            change |= {"solver.integrator": integrator, "solver.rtol": max(TIGHTER * rtol, TIGHTEST)}
-        else:
-            change["solver.step"] = 0.5 * solver.step
-        task = Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
+        finer = {"solver.rtol": max(TIGHTER * solver.rtol, TIGHTEST)}
+        change = finer if solver.step is None else {"solver.step": 0.5 * solver.step}
+        task = Graph(edited(self.scene, {**change, "accuracy": None}), shown=False, recipe=self.recipe).simulate
         # without a name of its own in progress and messages, the scene would seem to be run twice
         how = "a tighter tolerance" if solver.step is None else "half the step"
         return replace(task, scene=f"{task.scene} at {how}")
-
-    @property
-    def has_tighter(self) -> bool:
-        """True when a tighter tolerance or step can determine the error of a run."""
-        return self.scene.solver.step is not None or self.scene.solver.rtol > 10.0 * TIGHTEST
 
     @cached_property
     def overview(self) -> Task:

@@ -20,7 +20,7 @@ from flexclear.stages import effect_study, scenes
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
 from flexclear.study import cost
-from flexclear.study.members import Members, with_setting
+from flexclear.study.members import Members, integrated, with_setting
 from flexclear.system.errors import InputError, SolverError
 from flexclear.workflow.task import Task
 
@@ -62,8 +62,8 @@ def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
 
     data = answer.dataset()
     if name == "accuracy":
-        caption = "Error against processor time; the star is this scene"
-        return ShownAnswer("Accuracy against cost", sentences(data), "accuracy.png", caption)
+        caption = "Error of each quantity against processor time"
+        return ShownAnswer("Accuracy against cost", sentences(data), f"{cost.FIGURE}.png", caption)
     if name == "stability":
         columns = ("value", "limit", "verdict", "remedy")
         rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
@@ -135,10 +135,11 @@ class Answers:
     @cached_property
     def _study(self) -> cost.Study:
         """Return the study with the points in the neighbourhood of the scene's own setting."""
-        study = self._started
-        study.reserve = study.seconds * (1.0 - ACCURACY) if self.questions > 1 else 0.0
+        study, whole = self._started, self._started.seconds
+        study.seconds = whole * (ACCURACY if self.questions > 1 else 1.0)
         study.first()
         study.neighbourhood()
+        study.seconds = whole
         return study
 
     @cached_property
@@ -173,7 +174,6 @@ class Answers:
         effects, chosen = variants.effects_of(self.scene, self.of, "of"), self.scene.watched()
         if not effects or not chosen:
             return None
-        self._started.tighter()
         levels = MEMBERS[:1] if self.seconds is None else MEMBERS
         comparison = _Comparison(self.scene, self.workplace, effects, chosen, self._started, levels)
         return self.workplace.made(comparison.task())[0]
@@ -225,8 +225,8 @@ class _Comparison:
         words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if repeated else IDEAL}
         without = {name: self._variant(name) for name in ("", *names)}
         left = [words[name] for name in self._removed if name not in names and words[name]]
-        points = self.study.pair
-        return effect_study.ranking(self.scene, self.chosen, words, without, self.members.tasks, pairs, left, points)
+        errors = integrated(self.scene, self.study.setting, tight=self.tight)
+        return effect_study.ranking(self.scene, self.chosen, words, without, self.members.tasks, pairs, left, errors)
 
     @cached_property
     def _removed(self) -> Mapping[str, frozenset[str]]:

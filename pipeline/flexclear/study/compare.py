@@ -11,6 +11,7 @@ from flexclear.scene.variants import EFFECTS, ideal, loose
 from flexclear.stages.graph import Graph
 from flexclear.stages.scenes import joined, pictures, tables
 from flexclear.stages.workplace import Made, Workplace, check
+from flexclear.study import members
 from flexclear.system.errors import InputError, of_trial
 from flexclear.workflow.task import Task
 
@@ -41,16 +42,19 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
     graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(labels, sides, strict=True)}
     runs = workplace.bring([graph.simulate for graph in graphs.values()])
     check(runs)
-    # the runs have compiled the kernels, so that the tighter runs need not compile them concurrently
-    tight = {
-        label: graph.tighter(workplace.store.load(runs.records[graph.simulate]).attrs)
-        for label, graph in graphs.items()
-        if graph.has_tighter
-    }
+    chosen = [q for side in sides for q in side.watched()]
+    tight = dict[str, Task]()
+    for label, graph in graphs.items():
+        task = members.tighter(graph.scene, members.setting_of(graph.scene, workplace), chosen)
+        if task is not None:
+            tight[label] = task
     outcome = workplace.bring(list(tight.values()))
-    for failure in outcome.failures:
-        workplace.monitor.say(f"no error can be determined: {of_trial(failure.message)}")
-    (made,) = workplace.made(_task(graphs, {label: task for label, task in tight.items() if task in outcome.records}))
+    refused = {
+        task: str(made.dataset().attrs.get("refused", "")) for task, made in workplace.artifacts(outcome).items()
+    }
+    for message in (*(failure.message for failure in outcome.failures), *filter(None, refused.values())):
+        workplace.monitor.say(f"no error can be determined: {of_trial(message)}")
+    (made,) = workplace.made(_task(graphs, {label: task for label, task in tight.items() if refused.get(task) == ""}))
     title = f"Compared: {', '.join(graphs)}"
     publish(made.folder / "index.html", page(title, "The first run is the reference.", parts(made)))
     return made

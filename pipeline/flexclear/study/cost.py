@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Strict, ValidationError, model_validator
 
+from flexclear.dynamics.analyses import require_without_events
 from flexclear.scene.fields import Part
 from flexclear.scene.load import edited
 from flexclear.scene.validation_errors import input_errors
 from flexclear.stages import kernels, scenes, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace
-from flexclear.study import cost_design
-from flexclear.study.members import setting_of
+from flexclear.study import cost_design, members
 from flexclear.system.errors import FlexclearError, InputError, SolverError
 from flexclear.system.external_files import require_file
 from flexclear.workflow.task import Task
@@ -45,7 +45,7 @@ MOST_EVALUATIONS = 10.0
 #: number of skipped runs that are named
 LISTED_RUNS = 6
 #: tables of a study, in the order in which they are printed
-PRINTED = ("price.md", "quantities.md", "causes.md", "statistics.md")
+PRINTED = ("price.md", "causes.md", "statistics.md")
 #: figure of a study, and its title
 FIGURE, TITLE = "work_precision", "Error against cost"
 
@@ -70,8 +70,6 @@ class Study:
     points: list[cost_design.Design] = field(default_factory=list)
     undone: list[cost_design.Design] = field(default_factory=list)
     spent: float = 0.0
-    #: part of the budget that is left for others
-    reserve: float = 0.0
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
     #: loosest tolerance at which a point used up its evaluations, by integrator
     used_up: dict[str, float] = field(default_factory=dict)
@@ -87,6 +85,7 @@ class Study:
         """
         if self.points:
             return
+        require_without_events(self.scene, "the cost of a run")
         record = self._made(self._neighbours[0])
         if "refused" in record.attrs:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
@@ -97,17 +96,6 @@ class Study:
                 self.points.append(design)
         self.own = float(record.attrs["evaluations"])
         self.seconds_each = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
-
-    def tighter(self) -> None:
-        """Compute the point at a tenth of the scene's own tolerance or half of its step, if there is none yet."""
-        self.begin()
-        if self._neighbours[1].key not in self.runs:
-            self._made(self._neighbours[1])
-
-    @property
-    def pair(self) -> list[Task]:
-        """Tasks of the scene as it is and of the run by `tighter`."""
-        return [self.runs[design.key] for design in self._neighbours[:2]]
 
     def first(self) -> None:
         """Compute the first few points in the neighbourhood of the scene's own setting."""
@@ -141,7 +129,7 @@ class Study:
     @cached_property
     def setting(self) -> cost_design.Setting:
         """Integrator, tolerance and step of the scene's own run."""
-        return setting_of(self.scene, self.workplace)
+        return members.setting_of(self.scene, self.workplace)
 
     def task(self) -> Task:
         """Return the task of the study of all points so far."""
@@ -185,7 +173,12 @@ class Study:
             if self.spent + self.own * self.seconds_each * (ensemble.members if ensemble else 1) > self.seconds:
                 self.undone.append(design)
                 continue
-            task = _measured(design, "run_ensemble", {"quantities": names}, self._kernels(design))
+            task = replace(
+                members.point(design, names, self._kernels(design)),
+                stage="cost-ensemble",
+                run="flexclear.stages.cost_point:run_ensemble",
+                params={"simulate": simulation.params(change, ensemble=True), "quantities": names},
+            )
             self.workplace.datasets(task)
             self._ensembles[f"ensemble:rtol {rtol:g}"] = task
 
@@ -194,7 +187,7 @@ class Study:
         for design in (one for one in designs if one.key not in self.runs):
             seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
             compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
-            if self.spent + seconds + compiling > self.seconds - self.reserve or self._exhausted(design):
+            if self.spent + seconds + compiling > self.seconds or self._exhausted(design):
                 self.undone.append(design)
             else:
                 self._made(design)
@@ -206,12 +199,16 @@ class Study:
 
     def _made(self, design: cost_design.Design) -> xr.Dataset:
         """Return one point, brought up to date."""
-        if self.own:
+        run, tight = None if self.own else Graph(self.scene, shown=False).simulate, None
+        if self.points and design.key == self._neighbours[1].key:
+            tight = members.tighter_design(self.scene, self.setting)
+        if tight is not None:
+            design = tight  # the same run as that of a comparison
+        elif self.own:
             limit = min(self.scene.solver.evaluations, self._evaluation_limit())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
-        names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self.compiled
-        compiled = self._kernels(design)
-        task = _measured(design, "run", {"quantities": names, "brief": bool(self.points)}, compiled)
+        first, compiled = kernels.shared(design.scene) not in self.compiled, self._kernels(design)
+        task = members.point(design, members.names_of(self.scene), compiled, run)
         record, *kernel = self.workplace.datasets(*([task, compiled] if first else [task]))
         self.spent += sum(float(one.attrs["compile_seconds"]) for one in kernel)
         self.runs[design.key] = task
@@ -240,7 +237,7 @@ class Study:
     def _kernels(self, design: cost_design.Design) -> Task:
         shared = kernels.shared(design.scene)
         if shared not in self.compiled:
-            self.compiled[shared] = kernels.task(design.scene, _bundles(design))
+            self.compiled[shared] = kernels.task(design.scene, members.bundles(design))
         return self.compiled[shared]
 
 
@@ -284,11 +281,10 @@ def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, d
 
     made: as `bring` returned it.  pictures: folder for them next to the page.
     """
-    from flexclear.post.cost.answer import Studied, advice
+    from flexclear.post.cost.answer import Studied, sentences
 
     path = f"{pictures}/{name.replace('/', '_')}_{FIGURE}.png"
-    paragraph = advice(made.dataset(), tables(made))
-    return Studied(name, paragraph, tables(made), {TITLE: path}), {path: f"{FIGURE}.png"}
+    return Studied(name, sentences(made.dataset()), tables(made), {TITLE: path}), {path: f"{FIGURE}.png"}
 
 
 def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> None:
@@ -310,25 +306,6 @@ def _listed(keys: Sequence[str]) -> str:
     """Return the first keys as text, and the number of the others."""
     more = f" and {len(keys) - LISTED_RUNS} more" if len(keys) > LISTED_RUNS else ""
     return "; ".join(keys[:LISTED_RUNS]) + more
-
-
-def _bundles(design: cost_design.Design) -> dict[str, Task]:
-    return Graph(design.scene, shown=False, recipe=design.recipe).bodies()
-
-
-def _measured(design: cost_design.Design, function: str, more: Mapping[str, object], compiled: Task) -> Task:
-    """Return a task of `stages.cost_point` on a design's scene."""
-    ensemble = design.scene.ensemble is not None
-    return Task(
-        stage="cost-ensemble" if ensemble else "cost-point",
-        scene=design.scene.name,
-        part=design.key,
-        run=f"flexclear.stages.cost_point:{function}",
-        params={"simulate": simulation.params(design.scene, ensemble=ensemble), **more},
-        inputs={**_bundles(design), "kernels": compiled},
-        code=("flexclear.stages.kernels", *simulation.CODE),
-        exclusive=True,
-    )
 
 
 class Peer(Part):

@@ -43,11 +43,12 @@ UNSEEN = 3.0
 
 @dataclass(frozen=True)
 class Setting:
-    """Integrator and tolerance of the scene's own run; step: its fixed step [s], else None."""
+    """Integrator and tolerance of the scene's own run, and its evaluations; step: its fixed step [s], else None."""
 
     integrator: str
     rtol: float
     step: float | None = None
+    evaluations: int = 0
 
     @property
     def attributes(self) -> dict[str, Any]:

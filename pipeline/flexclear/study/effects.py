@@ -11,7 +11,7 @@ from flexclear.scene import variants
 from flexclear.stages import effect_study, watched_quantities
 from flexclear.stages.scenes import pictures, tables
 from flexclear.stages.workplace import Made, Workplace
-from flexclear.study.members import Members, setting_of, with_setting
+from flexclear.study.members import Members, integrated, setting_of, with_setting
 from flexclear.system.errors import InputError
 
 if TYPE_CHECKING:
@@ -45,7 +45,9 @@ def bring(
     scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested(present)}
     setting, runs = setting_of(scene, workplace), Members(workplace, chosen)
     runs.points({gone: with_setting(variant, setting) for gone, variant in scenes.items()}, members)
-    (made,) = workplace.made(effect_study.task(scene, present, chosen, scenes, runs.tasks, members))
+    (made,) = workplace.made(
+        effect_study.task(scene, present, chosen, scenes, runs.tasks, members, integrated(scene, setting))
+    )
     parts = [
         Part("chart", "Chart", pictures(made, {"effects.png": ("Each effect alone",)})),
         Part("table", "Table", tables(made, "effects.md")),

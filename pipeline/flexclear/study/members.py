@@ -6,28 +6,32 @@ tolerance of the scene's own run, which says those that the scene leaves open.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeVar
 
 from flexclear.scene.integrators import DEFAULT, VIBRATING
 from flexclear.scene.load import edited
 from flexclear.scene.solver import of_run
-from flexclear.stages import watched_quantities
+from flexclear.stages import kernels, simulation, watched_quantities
+from flexclear.stages.effect_study import Integrated
 from flexclear.stages.graph import Graph
-from flexclear.study.cost_design import Setting
+from flexclear.study.cost_design import Design, Setting, neighbours
+from flexclear.workflow.task import Task
 
 if TYPE_CHECKING:
     from flexclear.artifacts.points import Point
     from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
     from flexclear.stages.workplace import Workplace
-    from flexclear.workflow.task import Task
 
 #: name of a variant
 Name = TypeVar("Name", bound=Hashable)
-#: tightest tolerance of members with contacts: their starts differ by a thousandth of the clearance
-MEANS = 1e-7
+#: tightest tolerance of members with contacts: their starts differ by a thousandth of the clearance, which is more than
+#: this tolerance of the mechanism's size
+MEANS = 1e-6
+#: evaluations allowed to a tighter run: a multiple of those of the scene's own run, and at least the second number
+TIGHTER_EVALUATIONS, FEWEST_EVALUATIONS = 4, 100_000
 
 
 @dataclass
@@ -61,9 +65,71 @@ class Members:
 
 
 def setting_of(scene: Scene, workplace: Workplace) -> Setting:
-    """Return integrator, tolerance and step of the scene's own run."""
+    """Return integrator, tolerance, step and evaluations of the scene's own run."""
     (run,) = workplace.datasets(Graph(scene, shown=False).simulate)
-    return Setting(*of_run(scene.solver, scene.by_need(), run.attrs), scene.solver.step)
+    own = of_run(scene.solver, scene.by_need(), run.attrs)
+    return Setting(*own, scene.solver.step, int(run.attrs["evaluations"]))
+
+
+def point(design: Design, names: Sequence[str], compiled: Task, run: Task | None = None) -> Task:
+    """Return the task of `stages.cost_point` on a design's scene, which keeps these quantities.
+
+    compiled: the task of its kernels.  run: that of the scene's own run, where this is the same one.
+    """
+    return Task(
+        stage="cost-point",
+        scene=design.scene.name,
+        part=design.key,
+        run="flexclear.stages.cost_point:run",
+        params={"simulate": simulation.params(design.scene), "quantities": list(names)},
+        inputs={**bundles(design), "kernels": compiled, **({} if run is None else {"run": run})},
+        code=("flexclear.stages.kernels", *simulation.CODE),
+        exclusive=True,
+    )
+
+
+def bundles(design: Design) -> dict[str, Task]:
+    """Return the tasks of the bodies of a design's scene."""
+    return Graph(design.scene, shown=False, recipe=design.recipe).bodies()
+
+
+def names_of(scene: Scene, others: Iterable[Quantity] = ()) -> list[str]:
+    """Return the quantities that the points of a scene keep: requested, watched, and `others` that it has."""
+    owners = scene.owners()
+    asked = scene.requested() if scene.accuracy is not None else []
+    return list(dict.fromkeys(q.name for q in (*asked, *scene.watched(), *others) if q.is_there(owners)))
+
+
+def tighter_design(scene: Scene, own: Setting) -> Design | None:
+    """Return the scene at a tenth of its run's tolerance or half its step; None where no tolerance is tighter.
+
+    It takes at most a multiple of the run's evaluations.
+    """
+    design = neighbours(scene, own)[1]
+    if own.step is None and design.scene.solver.rtol >= own.rtol:
+        return None
+    most = min(max(TIGHTER_EVALUATIONS * own.evaluations, FEWEST_EVALUATIONS), scene.solver.evaluations)
+    return replace(design, scene=edited(design.scene, {"solver.evaluations": most}))
+
+
+def tighter(scene: Scene, own: Setting, others: Iterable[Quantity] = ()) -> Task | None:
+    """Return the point of `tighter_design`: its distance from the scene's run is the run's error."""
+    design = tighter_design(scene, own)
+    if design is None:
+        return None
+    first = neighbours(scene, own)[0]  # a study compiles the kernels for this one
+    return point(design, names_of(scene, others), kernels.task(first.scene, bundles(first)))
+
+
+def integrated(scene: Scene, own: Setting, *, tight: bool = False) -> Integrated:
+    """Return the runs from which the error of members' integration follows; tight: as of `with_setting`."""
+    task = tighter(scene, own)
+    if task is None:
+        return Integrated({})
+    rtol = with_setting(scene, own, tight=tight).solver.rtol
+    return Integrated(
+        {"own": Graph(scene, shown=False).simulate, "tight": task}, rtol / own.rtol if own.step is None else 1.0
+    )
 
 
 def with_setting(variant: Scene, setting: Setting, *, tight: bool = False) -> Scene:

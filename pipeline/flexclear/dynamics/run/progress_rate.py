@@ -54,10 +54,14 @@ Panel = Mapping[str, tuple[Judge, str]]
 
 
 class Judges(NamedTuple):
-    """Judges of a run and of its perturbed run; two panels, since judges may have memory."""
+    """Judges of a run and of its perturbed run; two panels, since judges may have memory.
+
+    trial: evaluations of the run before which the perturbed run does not begin, since the run may be given up.
+    """
 
     run: Panel
     perturbed: Panel
+    trial: int = 0
 
 
 def look(engine: Engine) -> Look:
@@ -107,7 +111,7 @@ def affordable(scene: Scene) -> Judges | None:
     """
     if scene.accuracy is not None or not scene.solver.by_need:
         return None
-    return Judges({DEFAULT: (Judge(None, _dear), STIFF)}, {})
+    return Judges({DEFAULT: (Judge(None, _dear), STIFF)}, {}, TRIAL)
 
 
 def unverified(scene: Scene) -> Scene:

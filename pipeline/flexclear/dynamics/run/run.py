@@ -19,7 +19,7 @@ from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.model.plausibility import start_errors
 from flexclear.dynamics.run import trajectory as stepping
-from flexclear.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.dynamics.run.evaluation.engine import Engine, another, prepare
 from flexclear.dynamics.run.evaluation.observation import observe_blocks
 from flexclear.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.dynamics.run.horizon.horizon import Pair
@@ -136,65 +136,97 @@ def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
 
 def integrate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Run:
-    """Return the complete run of `integrate_until_stopped`; raise StoppedError on a request to stop."""
-    run = integrate_until_stopped(scene, bundles, progress)
+    """Return the complete run of `RunInParts`; raise StoppedError on a request to stop."""
+    run = RunInParts(scene, bundles, progress).whole()
     if run.stopped:
         raise stopping.error(run.stopped)
     return run
 
 
-def integrate_until_stopped(
-    scene: Scene,
-    bundles: Mapping[str, Labelled],
-    progress: Progress,
-    judges: Judges | None = None,
-    *,
-    alone: bool = False,
-) -> Run:
-    """Build, start, integrate and observe a scene; actuators of a path are driven so that they produce it.
+class RunInParts:
+    """Start, integration and observation of a scene, up to a time or to the end; actuators of a path are driven so that
+    they produce it. It continues where it paused, with the same steps as in one go."""
 
-    bundles: reduced flexible bodies by name.  judges: decide whether another integrator continues; by default explicit
-    methods hand over when they would be too slow.  The perturbed run of a scene with contacts steps concurrently when a
-    processor is free; alone: it is left out.  On a request to stop the run so far is returned, with the reason.
-    Raises InputError for a scene that cannot be built, SolverError when the run cannot continue.
-    """
-    made = maker(scene, bundles, progress)
-    engine = made()
-    start = consistent_start(engine)
-    mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice
-    for sentence in [*mended, *([choice] if choice else [])]:
-        progress(None, sentence)
+    def __init__(
+        self, scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, judges: Judges | None = None
+    ) -> None:
+        """Build and start a scene.
 
-    ours, others = judges or (None, None)
+        bundles: reduced flexible bodies by name.  judges: decide whether another integrator continues; by default
+        explicit methods hand over when they would be too slow. Raises InputError for a scene that cannot be built,
+        SolverError for one that cannot start.
+        """
+        self._scene, self._progress, self._judges = scene, progress, judges
+        self._made = made = maker(scene, bundles, progress)
+        self._engine = engine = made()
+        self._start = consistent_start(engine)
+        self._mended, choice = tuple(mends(engine, self._start)), engine.model.mechanism.choice
+        for sentence in [*self._mended, *([choice] if choice else [])]:
+            progress(None, sentence)
+        repeated = engine.model.contacts and scene.output.horizon
+        self._pair = Pair(engine) if repeated else None
+        self._until, self._reached = np.inf, list[Followed]()
+        outputs, panel = None if self._pair is None else self._pair.outputs, None if judges is None else judges.run
+        other = lambda name: made(name, progress)  # noqa: E731
+        self._parts = follow_in_parts(engine, self._start, progress, other, panel, self._stop, outputs)
 
-    def steps(
-        mine: Engine, y: np.ndarray, tell: Progress, panel: Panel | None, stop: Stop, outputs: np.ndarray | None = None
-    ) -> Followed:
-        return follow(mine, y, tell, lambda name: made(name, tell), panel, stop, outputs)
+    def until(self, time: float) -> Run:
+        """Return the run up to a time [s] or later, without a perturbed run; raise SolverError when it cannot go on.
 
-    def seen(last: Engine, trajectory: Trajectory, switched: str = "") -> Run:
-        run = Run(scene, last, trajectory, observed(last, trajectory), None, switched, mended)
-        if last.control[m.TIME] < last.end:
+        On a request to stop it is the run so far, with the reason.
+        """
+        return self._observed(*self._advanced(time))
+
+    def _advanced(self, time: float) -> Followed:
+        """Return the trajectory up to a time [s] or later, or until a request to stop."""
+        self._until = time
+        while not self._reached or self._reached[0][0].control[m.TIME] < min(time, self._reached[0][0].end):
+            with stopping.heeded():
+                self._reached[:] = [next(self._parts)]
+            if stopping.requested():
+                break
+        return self._reached[0]
+
+    def _stop(self, rows: np.ndarray) -> bool:
+        """Return True where the steps pause; the pair is given the rows so far."""
+        return (asked if self._pair is None else self._pair.store_rows)(rows) or bool(rows[-1, 0] >= self._until)
+
+    def _observed(self, last: Engine, trajectory: Trajectory, switched: str) -> Run:
+        over = bool(last.control[m.TIME] >= last.end)
+        engine = last if over else another(last)  # observation would disturb an engine that goes on
+        shown = trajectory if self._pair is None else trajectory.without(self._pair.added)
+        run = Run(self._scene, engine, shown, observed(engine, shown), None, switched, self._mended)
+        if not over and stopping.requested():
             return replace(run, stopped=stopping.requested())
         require_shallow(run.model, run.trajectory, run.observed)
         require_closed(run.model, *run.judged)
         return run
 
-    if alone or not engine.model.contacts or not scene.output.horizon:
-        return seen(*steps(engine, start, progress, ours, asked))
-    pair = Pair(engine)
+    def whole(self) -> Run:
+        """Return the run to its end, and where it has contacts its perturbed run, which steps concurrently when a
+        processor is free. On a request to stop it is the run so far, with the reason."""
+        pair, engine, judges = self._pair, self._engine, self._judges
+        if pair is None:
+            return self.until(np.inf)
 
-    def neighbour(alive: Progress) -> PerturbedRun:
-        return pair.perturbed_run(start, lambda mine, y, *text: steps(mine, y, alive, others, *text), alive)
+        def steps(mine: Engine, y: np.ndarray, tell: Progress, stop: Stop, outputs: np.ndarray) -> Followed:
+            panel = None if judges is None else judges.perturbed
+            return follow(mine, y, tell, lambda name: self._made(name, tell), panel, stop, outputs)
 
-    with meanwhile(neighbour) as perturbed:
-        done = seen(*pair.run(lambda *text: steps(engine, start, progress, ours, *text)))
-        if done.stopped:
-            return done
-        try:
-            return replace(done, perturbed=perturbed())
-        except StoppedError as stopped:
-            return replace(done, stopped=str(stopped))
+        def begins() -> bool:
+            return judges is None or bool(engine.n[m.EVALUATIONS] >= judges.trial)
+
+        def neighbour(alive: Progress) -> PerturbedRun:
+            return pair.perturbed_run(self._start, lambda mine, y, *text: steps(mine, y, alive, *text), alive, begins)
+
+        with meanwhile(neighbour) as perturbed:
+            done = self._observed(*pair.run(lambda *text: self._advanced(np.inf)))
+            if done.stopped:
+                return done
+            try:
+                return replace(done, perturbed=perturbed())
+            except StoppedError as stopped:
+                return replace(done, stopped=str(stopped))
 
 
 def follow(
@@ -206,19 +238,35 @@ def follow(
     stop: Stop = never,
     outputs: np.ndarray | None = None,
 ) -> Followed:
-    """Return the trajectory from a consistent start y, the engine at its end, and why another engine continued, if so.
+    """Return the trajectory to the end or until `stop`; arguments and the other results as of `follow_in_parts`."""
+    with stopping.heeded():
+        return next(follow_in_parts(engine, y, progress, other, judges, stop, outputs))
+
+
+def follow_in_parts(
+    engine: Engine,
+    y: np.ndarray,
+    progress: Progress,
+    other: Callable[[str], Engine],
+    judges: Panel | None = None,
+    stop: Stop = never,
+    outputs: np.ndarray | None = None,
+) -> Iterator[Followed]:
+    """Yield the engine, its trajectory from a consistent start y, and why another engine continued, if so; whenever
+    `stop` asks for it, and at the end.
 
     other: makes the engine of another integrator, called only when needed.  judges: by integrator; an integrator to
     which a run returns has none.
-    stop, outputs: as of `trajectory.integrate`.
+    stop, outputs: as of `trajectory.in_parts`.
     """
     left, reasons, judges = None, list[str](), dict(judges or {})
     while True:
         traits = engine.method.traits
         judge, heir = judges.pop(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
         try:
-            done = stepping.integrate(engine, y, progress, stop, left, outputs, judge)
-            return engine, done, "\n".join(reasons)
+            for done in stepping.in_parts(engine, y, progress, stop, left, outputs, judge):
+                yield engine, done, "\n".join(reasons)
+            return
         except StiffError as stiff:
             progress(None, f"{stiff}; continuing with {heir}")
             reasons.append(str(stiff))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
@@ -126,9 +126,25 @@ def integrate(
     judge: Judge | None = None,
     jumps: Jumps | None = None,
 ) -> Trajectory:
-    """Integrate from a consistent start. Raise SolverError when the stepper gives up.
+    """Integrate from a consistent start, to the end or until `stop`; arguments and errors as of `in_parts`."""
+    with stopping.heeded():
+        return next(in_parts(engine, y, progress, stop, left, outputs, judge, jumps))
 
-    stop: called periodically with the rows so far; True ends the run.
+
+def in_parts(
+    engine: Engine,
+    y: np.ndarray,
+    progress: Progress,
+    stop: Stop = never,
+    left: Handover | None = None,
+    outputs: np.ndarray | None = None,
+    judge: Judge | None = None,
+    jumps: Jumps | None = None,
+) -> Iterator[Trajectory]:
+    """Integrate from a consistent start; yield the trajectory so far whenever `stop` asks for it, and at the end.
+
+    The steps are the same whether it stops or not. Raise SolverError when the stepper gives up.
+    stop: called periodically with the rows so far.
     left: handover of another method, from which this one continues.
     outputs: times of output [s], the start first; by default the scene's.
     judge: decides whether another method continues; by default when an explicit one would take far too long.
@@ -139,13 +155,20 @@ def integrate(
     if outputs is None:
         outputs = engine.output_times(engine.model.scene.output.interval)
     stopping.check()  # many short integrations never pause
-    with stopping.heeded():
-        tape = begin(engine, y, outputs, progress) if left is None else resume(engine, left, outputs, progress)
-        travel(engine, tape, begun, engine.end, progress, stop, judge, jumps)
-    return _collect(engine, tape)
+    tape = begin(engine, y, outputs, progress) if left is None else resume(engine, left, outputs, progress)
+    for _ in travel_in_parts(engine, tape, begun, engine.end, progress, stop, judge, jumps):
+        yield _collect(engine, tape)
+    yield _collect(engine, tape)
 
 
 def travel(
+    engine: Engine, tape: Tape, begun: float, until: float, progress: Progress, stop: Stop, judge: Judge
+) -> None:
+    """Integrate to a time [s] or until `stop`; arguments as of `travel_in_parts`."""
+    next(travel_in_parts(engine, tape, begun, until, progress, stop, judge), None)
+
+
+def travel_in_parts(
     engine: Engine,
     tape: Tape,
     begun: float,
@@ -154,10 +177,10 @@ def travel(
     stop: Stop,
     judge: Judge,
     jumps: Jumps | None = None,
-) -> None:
-    """Integrate to a time [s], from break to break; begun: breaks up to this time have been prepared.
+) -> Iterator[None]:
+    """Integrate to a time [s], from break to break; pause whenever `stop` asks for it.
 
-    Other arguments as of `integrate`.
+    begun: breaks up to this time have been prepared.  Other arguments as of `in_parts`.
     """
     sample, control = _sampler(engine), engine.control
     for a, b in pairwise(engine.breaks):
@@ -170,8 +193,8 @@ def travel(
             engine.select_pieces_after(0.5 * (a + b))
             engine.n[m.FRESH] = 1
         control[m.END] = min(b, until)
-        if _segment(engine, tape, progress, stop, judge, jumps):
-            break
+        while _segment(engine, tape, progress, stop, judge, jumps):
+            yield
 
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:

@@ -19,9 +19,8 @@ from flexclear.artifacts.effect_size import (
     REAL,
     Influence,
     chance,
-    influence,
-    predictable_difference,
-    predictable_outputs,
+    change,
+    early_changes,
     scatter,
     size,
 )
@@ -57,9 +56,7 @@ class Pair:
 
 def compared(pair: Pair, quantity: Quantity) -> Influence:
     """Return the change by the effect; nan where a run was refused."""
-    if pair.full.refused or pair.without.refused:
-        return Influence(np.nan, np.nan)
-    return influence(pair.without, pair.full, quantity, pair.members)
+    return change(pair.without, pair.full, quantity, pair.members)
 
 
 def decided(change: Influence, scale: float) -> bool:
@@ -67,20 +64,6 @@ def decided(change: Influence, scale: float) -> bool:
     if not np.isfinite(change.difference) or change.uncertainty == 0.0:
         return True
     return change.real or change.most <= SLIGHT * scale
-
-
-def outputs_of(pair: Pair, chosen: Sequence[Quantity]) -> int | None:
-    """Return the number of outputs up to the horizon of a pair (`predictable_outputs`)."""
-    if pair.full.refused or pair.without.refused:
-        return None
-    return predictable_outputs((pair.full, pair.without), chosen, pair.full)
-
-
-def early_change(pair: Pair, quantity: Quantity, outputs: int | None, error: float = 0.0) -> Influence:
-    """Return the change by the effect up to the horizon; nan where a run was refused."""
-    if pair.full.refused or pair.without.refused:
-        return Influence(np.nan, np.nan)
-    return predictable_difference(pair.without, pair.full, quantity, pair.members, outputs, error)
 
 
 def undecided(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
@@ -107,12 +90,8 @@ def assemble(
     """
     names = list(pairs)
     changes = [[compared(pairs[name], q) for q in chosen] for name in names]
-    begun = [outputs_of(pair, chosen) for pair in pairs.values()]
-    horizons = [np.nan if not n or not len(times) else float(times[n - 1]) for n in begun]
-    early = [
-        [early_change(pair, q, n, 2.0 * error(q, until if n is not None else np.inf)) for q in chosen]
-        for pair, n, until in zip(pairs.values(), begun, horizons, strict=True)
-    ]
+    begun = [early_changes(p.without, p.full, chosen, p.members, times, error) for p in pairs.values()]
+    horizons, early = [horizon for horizon, _ in begun], [row for _, row in begun]
     full = next(iter(pairs.values())).full
     scales = [size(full, q) if not full.refused else np.nan for q in chosen]
     differences = np.array([[c.difference for c in row] for row in changes])

@@ -5,13 +5,13 @@ Variants are named by the effects that they lack. The full scene lacks none, the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.effect_size import Influence, influence, predictable_difference, predictable_outputs
+from flexclear.artifacts.effect_size import Influence, change, early_changes, influence
 from flexclear.artifacts.points import Point
 from flexclear.post.overview.curves import in_unit, measured
 from flexclear.post.plotting.table import Table
@@ -65,12 +65,13 @@ def assemble(
     members: int,
     units: Sequence[str],
     times: Sequence[float] = (),
+    error: Callable[[Quantity, float], float] = lambda quantity, until: 0.0,
 ) -> xr.Dataset:
     """Return effect sizes over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
 
     The diagonal of (effect, other) holds single effects.  points: by the effects that a variant lacks. units: of the
-    chosen quantities.  times: of the outputs [s].  nan where a variant was refused; infinite where the quantity goes
-    with the effect.
+    chosen quantities.  times, error: of `effect_size.early_changes`.  nan where a variant was refused; infinite where
+    the quantity goes with the effect.
     """
     every, n = frozenset(effect.name for effect in effects), len(effects)
     shape = (n, n, len(chosen))
@@ -86,18 +87,14 @@ def assemble(
             gained = points[every - closed_up(effects, pair)]
             single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
             independent = i != j and one.within != other.name and other.within != one.name
-            outputs: int | None = 0
-            if i == j and not lost.refused and not full.refused:
-                outputs = predictable_outputs((lost, full), chosen, full)
-                horizon[i] = times[outputs - 1] if outputs and len(times) else np.nan
+            if i == j:
+                horizon[i], changes = early_changes(lost, full, chosen, members, times, error)
+                early[:, i] = np.array([(c.difference, c.uncertainty) for c in changes]).T
             for k, quantity in enumerate(chosen):
-                variables = {"dropped": _between(lost, full, quantity, members)}
-                variables["added"] = _between(gained, bare, quantity, members)
+                variables = {"dropped": change(lost, full, quantity, members)}
+                variables["added"] = change(gained, bare, quantity, members)
                 if independent:
                     variables["interaction"] = _interaction(gained, single, bare, quantity, members)
-                if i == j and outputs != 0:
-                    change = predictable_difference(lost, full, quantity, members, outputs, 0.0)
-                    early[:, i, k] = change.difference, change.uncertainty
                 for name, value in variables.items():
                     data[name][i, j, k], data[f"{name}_uncertainty"][i, j, k] = value.difference, value.uncertainty
     dims = ("effect", "other", "quantity")
@@ -113,7 +110,8 @@ def assemble(
         attrs={"Conventions": "CF-1.11", "members": members},
     )
     result["early"] = (("effect", "quantity"), early[0], {"long_name": f"{MEANINGS['dropped']}, up to the horizon"})
-    result["early_uncertainty"] = (("effect", "quantity"), early[1])
+    described = "part of that change that may be due to errors of the time integration"
+    result["early_uncertainty"] = (("effect", "quantity"), early[1], {"long_name": described})
     result["horizon"] = (
         ("effect",),
         horizon,
@@ -124,10 +122,6 @@ def assemble(
         result[f"{name}_uncertainty"].attrs = {"long_name": f"{text}: part that may be due to chance"}
     refused = {"+".join(sorted(gone)) or "full": p.refused for gone, p in points.items() if p.refused}
     return result.assign_attrs(refused="\n".join(f"without {gone}: {why}" for gone, why in refused.items()))
-
-
-def _between(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
-    return Influence(np.nan, np.nan) if a.refused or b.refused else influence(a, b, quantity, members)
 
 
 def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:

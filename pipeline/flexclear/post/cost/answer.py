@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.post.cost.causes import CAUSES, OTHER, dominant
+from flexclear.post.cost.causes import CAUSES, OTHER
 from flexclear.post.cost.study import methods, recording, resolved
-from flexclear.post.cost.work_precision import LOOKS
 from flexclear.post.overview.curves import size_of
-from flexclear.post.plotting import style
 from flexclear.post.plotting.table import Table
 
 #: a setting as accurate as the scene's own is named where it costs less than this fraction
@@ -99,32 +97,6 @@ def undone(study: xr.Dataset) -> list[str]:
     return [f"{text}: {study.attrs[name]}." for name, text in reasons.items() if study.attrs.get(name)]
 
 
-def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
-    """Draw ``<name>.png`` and ``.svg``: largest error of any quantity against processor time; a star: this scene."""
-    by_method: dict[str, list[Choice]] = {}
-    for choice in choices(study):
-        by_method.setdefault(choice.name.partition(",")[0], []).append(choice)
-    with style.style():
-        made, axes = style.grid(1, 1, (6.4, 3.6))
-        panel = axes[0, 0]
-        for method, result in by_method.items():
-            shown = sorted((c.seconds, c.error) for c in result if np.isfinite(c.error) and c.error > 0.0)
-            color, mark = LOOKS.get(method, ("#6b6b6b", "x"))
-            panel.plot(*np.array(shown).reshape(-1, 2).T, mark, color=color, ls="-", lw=1.0, ms=5, label=method)
-        _, error = _worst(study)
-        if np.isfinite(error):
-            panel.plot(study.attrs["own_seconds"], error, "*", color="#222222", ms=13, label="this scene", zorder=5)
-        uncertain = float(study["reference_uncertainty"].max())
-        if np.isfinite(uncertain) and uncertain > 0.0:
-            panel.axhline(uncertain, color="#6b6b6b", lw=0.9, ls=":", label="difference of the two most accurate runs")
-        panel.set(xscale="log", yscale=style.scale_of(panel), xlabel="processor time of the integration (s)")
-        panel.set_ylabel("largest relative error")
-        style.plain(panel.xaxis)
-        panel.legend(fontsize=8)
-        style.heading(made, title)
-        return style.files(name, made)
-
-
 INTRODUCTION = """# What accuracy costs
 
 Made from the datasets `results/cost/<scene>/cost.nc` by
@@ -142,7 +114,7 @@ not.
 
 @dataclass(frozen=True, slots=True)
 class Studied:
-    """Section of the page on a scene: `advice`, tables (Markdown), pictures by title, relative to the page."""
+    """Section of the page on a scene: `advice` (`sentences`), tables (Markdown), pictures by title."""
 
     scene: str
     advice: str
@@ -164,62 +136,6 @@ def sections(scenes: tuple[Studied, ...]) -> str:
         parts += [f"![{title} of {s.scene}]({path})\n" for title, path in s.pictures.items()]
         parts += [table.rstrip() + "\n" for table in s.tables]
     return "\n".join(parts)
-
-
-def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
-    """Return one paragraph: cheapest way to each accuracy, cost of a digit, horizon, and limits of the scene."""
-    choices = {target: cheapest(study, target) for target in TARGETS}
-    met = {target: choice for target, choice in choices.items() if choice is not None}
-    text = "; ".join(f"{target:g} takes {c.name} ({c.seconds:.2g} s)" for target, c in met.items())
-    parts = [f"{text}." if met else "No requested accuracy can be reached for all quantities; see the tables below."]
-    if met:
-        parts += [_digits(met)]
-    parts += [_some(study, target) for target in TARGETS if target not in met]
-    parts += [_horizon(study, tables), _limits(study)]
-    return " ".join(filter(None, parts))
-
-
-def _some(study: xr.Dataset, target: float) -> str:
-    """Return a sentence on the quantities that reach an accuracy which not all reach."""
-    names = [str(name) for name in study["quantity"].values]
-    able = [name for name in names if cheapest(study.sel(quantity=[name]), target) is not None]
-    unable = ", ".join(name for name in names if name not in able)
-    return (
-        f"{target:g} is possible for {', '.join(able)}, not for {unable}." if able else f"{target:g} is not possible."
-    )
-
-
-def _digits(met: Mapping[float, Choice]) -> str:
-    loose, tight = met[max(met)], met[min(met)]
-    digits = np.log10(max(met) / min(met))
-    if not digits > 0.0 or tight.seconds <= loose.seconds:
-        return ""
-    return f"Each further digit multiplies the time by {(tight.seconds / loose.seconds) ** (1.0 / digits):.2f}."
-
-
-def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
-    """Return advice for a run that cannot be predicted to its end."""
-    horizon, end = study.attrs["horizon"], study.attrs["end"]
-    if horizon == "none" or horizon >= end:
-        return ""
-    beyond = "the means of an ensemble (below), which more members improve and tighter tolerances do not"
-    if not any("Beyond the horizon" in table for table in tables):
-        beyond = "an ensemble, which the scene can request (`[ensemble]`)"
-    return f"All this holds up to t = {horizon:.3g} s of {end:.3g} s; beyond that use only {beyond}."
-
-
-def _limits(study: xr.Dataset) -> str:
-    """Return advice on refinement of the scene: the dominant causes, each with its quantities."""
-    if "error_by_cause" not in study:
-        return ""
-    by_cause: dict[str, list[str]] = {}
-    for name in study["quantity"].values:
-        errors = study["error_by_cause"].sel(quantity=name).values
-        cause = dominant(dict(zip(study["cause"].values, errors, strict=True)))
-        if not np.nanmax(errors, initial=0.0) < ROUNDING:
-            by_cause.setdefault(cause, []).append(str(name))
-    parts = [f"{_remedy(study, c)} ({c} limits {', '.join(q)})" for c, q in by_cause.items() if c in CAUSES]
-    return f"To refine the scene as it is: {'; '.join(parts)}." if parts else ""
 
 
 TARGETS = (1e-3, 1e-6, 1e-9)
@@ -247,19 +163,6 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
                 (f"{target:g}", choice.name, f"{choice.evaluations:.0f}", seconds, f"{choice.error:.1e}", choice.worst)
             )
     return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
-
-
-def by_quantity(study: xr.Dataset, title: str) -> Table:
-    """Tabulate settings and costs for the same accuracies for each quantity by itself."""
-    rows = []
-    for name in study["quantity"].values:
-        one = study.sel(quantity=[name])
-        best = min(choices(one), key=lambda c: c.error, default=NOTHING)
-        best_for = [cheapest(one, target) for target in TARGETS]
-        cells = (f"{c.name} ({c.seconds:.2g} s)" if c is not None else _absent(study) for c in best_for)
-        rows.append((str(name), *cells, f"{best.error:.1e}"))
-    heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
-    return Table(title, heads, tuple(rows), ("In brackets: processor time of the integration of one run.",))
 
 
 def _absent(study: xr.Dataset) -> str:

@@ -157,7 +157,7 @@ def table(compared: xr.Dataset) -> Table:
             against = "reference" if i == 0 else _difference(compared, i, j, unit)
             rows.append((str(name), label, in_unit(float(part["largest"]), unit), _own(error, unit), against))
     notes = [
-        "Own error: the largest difference between this run and the same run at a 100 times tighter tolerance "
+        "Own error: the largest difference between this run and the same run at a ten times tighter tolerance "
         "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "
         "times that both have; for forces and velocities also that of their peaks between output times. It is "
         "as uncertain as both runs' own errors together, and with impacts that of two single runs, not of means."

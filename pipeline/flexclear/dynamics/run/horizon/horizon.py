@@ -83,22 +83,29 @@ class Pair:
     def run(self, steps: Callable[[Stop, np.ndarray], Followed]) -> Followed:
         """Return the result of the run that takes these steps, without the rows that only serve comparisons."""
         try:
-            engine, trajectory, switched = steps(self._store_rows, self.outputs)
-            self._store_rows(trajectory.rows)
+            engine, trajectory, switched = steps(self.store_rows, self.outputs)
+            self.store_rows(trajectory.rows)
             self._between, self._complete = trajectory.between, True
         finally:
             self._ended.set()
         return engine, trajectory.without(self.added), switched
 
     def perturbed_run(
-        self, start: np.ndarray, steps: Callable[[Engine, np.ndarray, Stop, np.ndarray], Followed], alive: Progress
+        self,
+        start: np.ndarray,
+        steps: Callable[[Engine, np.ndarray, Stop, np.ndarray], Followed],
+        alive: Progress,
+        begins: Callable[[], bool] = lambda: True,
     ) -> PerturbedRun:
         """Run the scene again from a start whose contacts are moved, and compare the two.
 
         steps: takes the same steps as the run, with an engine from a start.  alive: called while the perturbed run
-        waits for the run; an exception from it ends the work.
+        waits for the run; an exception from it ends the work.  begins: True once it may begin before the run has ended.
         """
         engine, other, failed = self._engine, self._no_rows(), False
+        self._await_run(alive, begins)
+        if self._ended.is_set() and not self._complete:
+            raise SolverError("the run itself has failed")
 
         def enough(rows: np.ndarray) -> bool:
             other.rows = rows
@@ -116,8 +123,8 @@ class Pair:
             return PerturbedRun(np.array([engine.start]), np.zeros(1), engine.start)
         return PerturbedRun(time, separation, engine.end if horizon is None else horizon)
 
-    def _store_rows(self, rows: np.ndarray) -> bool:
-        """Store the rows that the run has so far, and return True on a request to stop."""
+    def store_rows(self, rows: np.ndarray) -> bool:
+        """Store the rows that the run has so far; return True on a request to stop."""
         self._run.rows = rows
         return asked(rows)
 
@@ -139,9 +146,9 @@ class Pair:
         first = self._diverged(self._separation(other))
         return first is not None and bool(other.rows[-1, 0] >= self._examined_until(first))
 
-    def _await_run(self, alive: Progress) -> None:
-        """Wait for the end of the run; a run that fails before its first step has no end."""
-        while not self._ended.wait(TICK):
+    def _await_run(self, alive: Progress, enough: Callable[[], bool] = lambda: False) -> None:
+        """Wait for the end of the run, or until `enough`; a run that fails before its first step has no end."""
+        while not enough() and not self._ended.wait(TICK):
             alive(None, "")
 
     def _comparison(self, other: _Side) -> tuple[np.ndarray, np.ndarray, float | None]:

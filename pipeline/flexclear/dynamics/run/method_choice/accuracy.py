@@ -1,10 +1,11 @@
-"""Run with the requested accuracy of time integration, by trying tolerances and estimating errors.
+"""Run with the requested accuracy of time integration, by a ladder of tolerances that estimate each other's errors.
 
 Where the scene names no integrator, each run uses the one that is predicted to be cheapest (`method_selection`).
 
-The error of a run is estimated by the same run at a hundred times tighter tolerance: an adaptive method whose tolerance
-is proportional to its error (tolerance proportionality) then overestimates its distance to the exact solution by about
-one per cent. Errors of the model (modes, mesh, contact law) are not part of it.
+The error of a run is estimated by the same run at the next tighter tolerance of the ladder: the error of an adaptive
+method is proportional to its tolerance, so that the difference of the two is the error less the other's known part of
+it. Each run serves as the comparison of the one before, and goes on to the end only where it is delivered.
+Errors of the model (modes, mesh, contact law) are not part of it.
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, sec. II.4.
 """
 
@@ -13,7 +14,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -27,37 +28,37 @@ from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress
 
 if TYPE_CHECKING:
+    from flexclear.artifacts.labelled import LabelledArrays
     from flexclear.dynamics.run.method_choice.method_selection import Costs
     from flexclear.dynamics.run.progress_rate import Judges
 
-#: tolerance of the run that serves the error estimate, as a fraction of the run's
-FINER_TOLERANCE = 1e-2
-#: limits of the tolerances that are tried; below, rounding dominates
+#: limits of the tolerances that are tried for a request; below, rounding dominates
 TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE = 1e-14, 1e-2
-#: limits of an accepted run's error, as fractions of the requested accuracy: sufficient, and not wasteful
-ACCEPTED, WASTEFUL = 1.0, 1.0 / 3.0
-#: error at which the next try aims, between the two
-AIM = 0.6
-TOLERANCE_TRIES = 12
-#: least predicted saving of a looser tolerance, as a fraction of the evaluations of a sufficient run
-SAVED = 0.25
-#: a run refused at a tolerance looser than this is tried again at a fraction of the tolerance
-REFUSED_FOR_GOOD, TIGHTER_AFTER_REFUSAL = 1e-9, 0.1
-#: an error that does not fall below this fraction at FINER_TOLERANCE has another cause than the steps
+#: the ladder for a relative request begins at this multiple of it: errors are rarely smaller than the tolerance
+ABOVE_REQUEST = 10.0
+#: ratio of neighbouring tolerances, and that of runs without contacts and request: they cost so little that half as
+#: many, each of which may be tighter than necessary, cost less
+FINER_RUNG, SMOOTH_RUNG = 0.1, 1e-2
+#: an error that does not fall below this fraction at the next tolerance has another cause than the steps
 STUCK = 0.3
-#: default requested accuracy, as a fraction of each quantity's range; the loosest and the tightest tolerance of the
-#: ladder that is climbed for it; and the ratio of neighbouring ones in scenes with contacts: twice the runs, but those
-#: that serve comparisons end at the horizon, and the delivered run need not be tighter than necessary
-BY_DEFAULT, LOOSEST_RUNG, TIGHTEST_RUNG, FINER_RUNG = 1e-3, 1e-4, 1e-10, 0.1
+#: default requested accuracy, as a fraction of each quantity's range; loosest and tightest tolerance of its ladder
+BY_DEFAULT, LOOSEST_RUNG, TIGHTEST_RUNG = 1e-3, 1e-4, 1e-10
 #: motions below this fraction of their natural size are rounding, which stiff rods magnify in forces
 ROUNDING_OF_MOTION = 1e-9
 
 
-class Make(Protocol):
-    """Makes the run of a scene, under judges of its integrators."""
+class Parts(Protocol):
+    """A run that can be had in parts: up to a time, then from there to its end."""
 
-    def __call__(self, scene: Scene, judges: Judges | None, /, *, alone: bool = False) -> xr.Dataset:
-        """Return the run. alone: without the perturbed run that gives the predictability horizon."""
+    def until(self, time: float, /) -> LabelledArrays:
+        """Return the run up to a time [s] or later, without predictability horizon."""
+
+    def whole(self) -> LabelledArrays:
+        """Return the run to its end, with its horizon."""
+
+
+#: begins the run of a scene, under judges of its integrators
+Make = Callable[[Scene, "Judges | None"], Parts]
 
 
 @dataclass(frozen=True)
@@ -65,125 +66,104 @@ class Attempt:
     """A run at one tolerance: estimated errors by quantity, and the largest one relative to the requested accuracy."""
 
     rtol: float
-    run: xr.Dataset
     errors: Mapping[str, float]
     fraction: float
+
+    @property
+    def met(self) -> bool:
+        """True when all errors are within the request."""
+        return self.fraction <= 1.0
 
 
 @dataclass
 class Search:
-    """Runs made so far, by tolerance, and the request.
+    """Runs begun so far, by tolerance, and the request.
 
     predictable: True for the default request, for which runs are compared only up to the predictability horizon, and
-    quantities that never change meet the request. shorter: runs that end at a horizon, by tolerance.
+    quantities that never change meet the request. shown: what is known of each run.  wholes: those with their horizons.
     """
 
     scene: Scene
     make: Make
     costs: Costs | None = None
-    runs: dict[float, xr.Dataset] = field(default_factory=dict)
-    shorter: dict[float, xr.Dataset] = field(default_factory=dict)
     predictable: bool = False
+    begun: dict[float, Parts] = field(default_factory=dict)
+    shown: dict[float, xr.Dataset] = field(default_factory=dict)
+    wholes: dict[float, xr.Dataset] = field(default_factory=dict)
 
-    def run(self, rtol: float) -> xr.Dataset:
-        """Return the run at a tolerance, made once."""
-        if rtol not in self.runs:
-            self.runs[rtol] = self._made(self.scene, rtol)
-        return self.runs[rtol]
+    def whole(self, rtol: float) -> xr.Dataset:
+        """Return the whole run at a tolerance, made once."""
+        if rtol not in self.wholes:
+            self.wholes[rtol] = self.shown[rtol] = self._made(rtol, lambda parts: parts.whole())
+        return self.wholes[rtol]
 
-    def until(self, rtol: float, horizon: float) -> xr.Dataset:
-        """Return the run at a tolerance, which may end at the horizon [s] or later, made once."""
-        if rtol in self.runs or horizon >= self.scene.time.end:
-            return self.run(rtol)
-        if rtol not in self.shorter or float(self.shorter[rtol]["time"][-1]) < horizon:
-            end = max(horizon, self.scene.time.start + self.scene.output.interval)
-            self.shorter[rtol] = self._made(edited(self.scene, {"time.end": end}), rtol, alone=True)
-        return self.shorter[rtol]
+    def until(self, rtol: float, time: float) -> xr.Dataset:
+        """Return the run at a tolerance up to a time [s] or later; its parts are made once."""
+        if rtol not in self.shown or float(self.shown[rtol]["time"][-1]) < min(time, self.scene.time.end):
+            self.shown[rtol] = self._made(rtol, lambda parts: parts.until(time))
+        return self.shown[rtol]
 
-    def _made(self, scene: Scene, rtol: float, **how: bool) -> xr.Dataset:
+    def _made(self, rtol: float, part: Callable[[Parts], LabelledArrays]) -> xr.Dataset:
+        change: dict[str, object] = {"solver.rtol": rtol}
         if self.costs is None:
-            return self.make(edited(scene, {"solver.rtol": rtol}), None, **how)
-        name, why = self.costs.best(rtol), self.costs.why(rtol)
-        run = self.make(edited(scene, {"solver.rtol": rtol, "solver.integrator": name}), self.costs.judges(rtol), **how)
-        self.costs.learn(rtol, name, run, (scene.time.end - scene.time.start) / self.costs.span)
+            if rtol not in self.begun:
+                self.begun[rtol] = self.make(edited(self.scene, change), None)
+            return part(self.begun[rtol]).to_xarray()
+        name, why, known = self.costs.best(rtol), self.costs.why(rtol), rtol in self.begun
+        if not known:
+            change["solver.integrator"] = name
+            self.begun[rtol] = self.make(edited(self.scene, change), self.costs.judges(rtol))
+        run = part(self.begun[rtol]).to_xarray()
+        if known:
+            return run.assign_attrs(method_reason=self.shown[rtol].attrs["method_reason"])
+        share = (float(run["time"][-1]) - self.scene.time.start) / self.costs.span
+        self.costs.learn(rtol, name, run, min(share, 1.0))
         return run.assign_attrs(method_reason=why)
-
-    def attempt(self, rtol: float) -> Attempt:
-        """Return the run at a tolerance and its estimated errors."""
-        run = self.run(rtol)
-        finer = max(rtol * FINER_TOLERANCE, TIGHTEST_TOLERANCE)
-        # the tightest run can only be compared with a looser one, whose error is larger
-        other = self.run(finer if finer < rtol else rtol / FINER_TOLERANCE)
-        requested = self.requested(other)
-        # all tighter runs are compared: with impacts, two close tolerances may agree by chance
-        witnesses = [other, *(r for tolerance, r in self.runs.items() if tolerance <= 0.1 * rtol)]
-        errors = {q.name: max(self.error(run, r, q) for r in witnesses) for q in requested}
-        return Attempt(rtol, run, errors, max((errors[q.name] / w for q, w in requested.items()), default=0.0))
-
-    def error(self, run: xr.Dataset, other: xr.Dataset, quantity: Quantity) -> float:
-        """Return the largest difference of two runs within the compared time, in the unit of the quantity."""
-        horizons = [float(one["horizon"]) for one in (run, other) if self.predictable and "horizon" in one]
-        return quantities.error(run, other, quantity, min(horizons, default=math.inf))
-
-    def cheapest(self, attempt: Attempt) -> Attempt:
-        """Return the attempt, or the run that served its error estimate if another method made that run at less cost.
-
-        The difference of the two is at least the error of either, unless both err alike, so runs tighter than both are
-        compared as well.
-        """
-        finer = attempt.rtol * FINER_TOLERANCE
-        other = self.runs.get(finer)
-        if (
-            attempt.fraction > ACCEPTED
-            or other is None
-            or other.attrs["evaluations"] >= attempt.run.attrs["evaluations"]
-        ):
-            return attempt
-        tighter = [run for rtol, run in self.runs.items() if rtol < finer]
-        if not tighter:
-            return replace(attempt, rtol=finer, run=other)
-        requested = self.requested(other)
-        errors = {q.name: max(attempt.errors[q.name], *(self.error(other, r, q) for r in tighter)) for q in requested}
-        fraction = max((errors[q.name] / w for q, w in requested.items()), default=0.0)
-        return Attempt(finer, other, errors, fraction) if fraction <= ACCEPTED else attempt
 
     @property
     def ratio(self) -> float:
         """Ratio of neighbouring tolerances of the ladder."""
-        return FINER_RUNG if self.scene.contacts() or self.scene.stop else FINER_TOLERANCE
+        smooth = self.predictable and not self.scene.contacts() and not self.scene.stop
+        return SMOOTH_RUNG if smooth else FINER_RUNG
+
+    @property
+    def loosest(self) -> float:
+        """First tolerance of the ladder."""
+        assert self.scene.accuracy is not None
+        if self.predictable:
+            return LOOSEST_RUNG
+        fractions = [want.relative for want in self.scene.accuracy.quantities.values() if want.relative is not None]
+        guess = min((ABOVE_REQUEST * fraction for fraction in fractions), default=LOOSEST_TOLERANCE)
+        return float(f"{np.clip(guess, 100.0 * TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE):.1e}")
 
     def next_rung(self, rtol: float) -> float:
         """Return the next tighter tolerance of the ladder."""
-        return float(f"{self.ratio * rtol:.1e}")
+        return float(f"{max(self.ratio * rtol, TIGHTEST_TOLERANCE):.1e}")
 
     def rung(self, rtol: float, until: float) -> Attempt:
-        """Return the run at a tolerance, compared up to a time [s] with the one at the next tighter tolerance.
-
-        The difference of the two is the error less that of the other, which is `ratio` of it.
-        """
+        """Return the run at a tolerance, compared up to a time [s] with the one at the next tighter tolerance."""
         run, other = self.until(rtol, until), self.until(self.next_rung(rtol), until)
-        requested = self.requested(self.runs[min(self.runs)])
+        requested = self.requested(self.sizes)
         errors = {q.name: quantities.error(run, other, q, until) / (1.0 - self.ratio) for q in requested}
-        return Attempt(rtol, run, errors, max((errors[q.name] / w for q, w in requested.items()), default=0.0))
+        return Attempt(rtol, errors, max((errors[q.name] / w for q, w in requested.items()), default=0.0))
 
-    def uncompared(self, refusal: SolverError) -> Attempt:
-        """Return the tightest run, without an estimate; raise the refusal where none exists."""
-        if not self.runs:
-            raise refusal
-        rtol = min(self.runs)
-        return Attempt(rtol, self.runs[rtol], {}, math.inf)
+    @property
+    def sizes(self) -> xr.Dataset:
+        """The run by whose sizes relative requests are judged: the tightest one that reached the end."""
+        end = max(float(run["time"][-1]) for run in self.shown.values())
+        return self.shown[min(rtol for rtol, run in self.shown.items() if float(run["time"][-1]) >= end)]
 
-    def saves(self, rtol: float, looser: float) -> bool:
-        """Return True when a run at a looser tolerance is predicted to be cheap enough to be worth making.
-
-        Where stability limits the steps it is not, and two runs are needed to know its error.
-        """
-        at = max(rtol * FINER_TOLERANCE, TIGHTEST_TOLERANCE)
-        before, finer = self.runs[rtol], self.runs.get(at)
-        if finer is None or finer is before or finer.attrs["method"] != before.attrs["method"]:
-            return True
-        growth = math.log(finer.attrs["evaluations"] / before.attrs["evaluations"]) / math.log(rtol / at)
-        return (rtol / looser) ** max(growth, 0.0) < 1.0 - SAVED
+    def cheapest(self, attempt: Attempt) -> Attempt:
+        """Return the attempt, or the run that served its error estimate if another method made that run at less cost:
+        it errs by less."""
+        finer = self.next_rung(attempt.rtol)
+        if not attempt.met or finer not in self.shown:
+            return attempt
+        run, other = self.shown[attempt.rtol], self.shown[finer]
+        rates = [one.attrs["evaluations"] / float(one["time"][-1] - one["time"][0]) for one in (run, other)]
+        if other.attrs["method"] == run.attrs["method"] or rates[1] >= rates[0]:
+            return attempt
+        return Attempt(finer, attempt.errors, attempt.fraction)
 
     def requested(self, run: xr.Dataset) -> dict[Quantity, float]:
         """Return the requested accuracy in SI by quantity; relative ones refer to the quantity's size in `run`."""
@@ -215,13 +195,12 @@ def deliver(scene: Scene, make: Make, progress: Progress, costs: Costs | None = 
     costs: costs for method selection; None where the scene names an integrator.  The dataset's attributes state
     requested and estimated errors, the verdict, and the reason of the method.
     """
-    search = Search(scene, make, costs)
-    return _delivered(search, search.cheapest(_search(search, progress)), progress)
+    return _delivered(Search(scene, make, costs), progress)
 
 
 def at_tolerance(scene: Scene, make: Make, costs: Costs) -> xr.Dataset:
     """Return the run of a scene at its own tolerance, by the method that is predicted to be cheapest."""
-    return Search(scene, make, costs).run(scene.solver.rtol)
+    return Search(scene, make, costs).whole(scene.solver.rtol)
 
 
 def by_default(
@@ -238,115 +217,69 @@ def by_default(
     names = [q.name for q in scene.requested() if q.over_time]
     request = {"quantities": {name: {"relative": BY_DEFAULT} for name in names}, "allow_missed": True, "by_need": True}
     wanting = edited(scene, {"accuracy": request})
-    search = Search(wanting, make, costs(wanting), predictable=True)
-    return _delivered(search, search.cheapest(_climb(search, progress)), progress)
+    return _delivered(Search(wanting, make, costs(wanting), predictable=True), progress)
 
 
 def _climb(search: Search, progress: Progress) -> Attempt:
-    """Return the run at the loosest tolerance of the ladder that meets the request, or the one with the least error.
+    """Return the loosest tolerance of the ladder that meets the request, else the one with the least error.
 
-    Runs that serve comparisons end at the horizon of the run at the loosest tolerance, unless the delivered run has a
-    later one.
+    Up to their horizons, runs are compared up to that of the run at the loosest tolerance, unless the delivered run has
+    a later one. A run that is refused, as where its energy ledger does not close, is left out.
     """
-    rtol, until, nearest, refusal = LOOSEST_RUNG, -math.inf, list[Attempt](), SolverError("")
-    while rtol > TIGHTEST_RUNG:
+    tightest = TIGHTEST_RUNG if search.predictable else TIGHTEST_TOLERANCE
+    rtol, until, nearest, refusal = search.loosest, -math.inf, list[Attempt](), SolverError("")
+    while rtol > tightest:
         try:
-            if until < 0.0 or rtol in search.runs:
-                until = max(until, _horizon(search, search.run(rtol)))
+            if until < 0.0 or rtol in search.wholes:
+                until = max(until, _horizon(search, rtol))
             now = search.rung(rtol, until)
-            if now.fraction <= ACCEPTED and _horizon(search, search.run(rtol)) > until:
+            if now.met and _horizon(search, rtol) > until:
                 continue  # compare up to its own horizon
         except SolverError as error:
             refusal, rtol = error, search.next_rung(rtol)
             continue
         progress(None, f"tolerance {rtol:.1e}: error {now.fraction:.2g} of the requested accuracy")
         nearest.append(now)
-        if now.fraction <= ACCEPTED:
+        if now.met:
             break
         rtol = search.next_rung(rtol)
-    if not nearest:
-        return search.uncompared(refusal)
-    best = min(nearest, key=lambda one: (one.fraction, one.rtol))
-    return replace(best, run=search.run(best.rtol))
+    if nearest:
+        return min(nearest, key=lambda one: (one.fraction, one.rtol))
+    whole = [rtol for rtol, run in search.shown.items() if float(run["time"][-1]) >= search.scene.time.end]
+    if not whole:
+        raise refusal
+    return Attempt(min(whole), {}, math.inf)
 
 
-def _horizon(search: Search, run: xr.Dataset) -> float:
-    """Return the predictability horizon of a run [s], its end where it has none."""
+def _horizon(search: Search, rtol: float) -> float:
+    """Return the time up to which a run counts [s]: its predictability horizon, its end where none is asked for."""
+    run = search.whole(rtol) if search.predictable else {}
     return float(run["horizon"]) if "horizon" in run else search.scene.time.end
 
 
-def _delivered(search: Search, best: Attempt, progress: Progress) -> xr.Dataset:
-    sizes = search.runs[min(search.runs)] if search.predictable else best.run
-    requested = {q.name: w for q, w in search.requested(sizes).items() if q.name in best.errors or not best.errors}
-    met = best.fraction <= ACCEPTED
-    verdict = "met" if met else _missed(search, best, requested)
+def _delivered(search: Search, progress: Progress) -> xr.Dataset:
+    best = search.cheapest(_climb(search, progress))
+    run = search.whole(best.rtol)
+    requested = {
+        q.name: w for q, w in search.requested(search.sizes).items() if q.name in best.errors or not best.errors
+    }
+    verdict = "met" if best.met else _missed(search, best, requested)
     progress(None, f"accuracy {verdict} (relative tolerance {best.rtol:.1e})")
-    if "method_reason" in best.run.attrs:
-        progress(None, str(best.run.attrs["method_reason"]))
-    ratio = 1.0 / (search.ratio if search.predictable else FINER_TOLERANCE)
-    meaning = f"largest error of the time integration, estimated by two runs with a tolerance ratio of {ratio:g}"
+    if "method_reason" in run.attrs:
+        progress(None, str(run.attrs["method_reason"]))
+    meaning = (
+        f"largest error of the time integration, estimated by two runs with a tolerance ratio of {1.0 / search.ratio:g}"
+    )
     if search.predictable:
         meaning += f"; requested by default: {BY_DEFAULT:g} of the range, up to the predictability horizon"
-    return best.run.assign_attrs(
+    return run.assign_attrs(
         accuracy_requested=json.dumps({name: f"{w:.3g}" for name, w in requested.items()}, sort_keys=True),
         accuracy_estimated=json.dumps({name: f"{e:.3g}" for name, e in best.errors.items()}, sort_keys=True),
         accuracy_verdict=verdict,
         accuracy_rtol=best.rtol,
-        accuracy_runs=len(search.runs) + len(search.shorter),
+        accuracy_runs=len(search.begun),
         accuracy_meaning=meaning,
     )
-
-
-def _search(search: Search, progress: Progress) -> Attempt:
-    """Return the attempt found by varying the tolerance: the errors' logarithm is nearly linear in the tolerance's."""
-    rtol = _first(search.scene)
-    enough: Attempt | None = None
-    nearest: Attempt | None = None
-    too_loose = math.inf
-    for _ in range(TOLERANCE_TRIES):
-        try:
-            now = search.attempt(rtol)
-        except SolverError:
-            if rtol <= REFUSED_FOR_GOOD:
-                raise
-            # the tolerance is so loose that the run is refused, as when its energy ledger does not close
-            too_loose = min(too_loose, rtol)
-            rtol = _next(rtol, 1.0 / TIGHTER_AFTER_REFUSAL, enough, too_loose)
-            continue
-        progress(None, f"tolerance {rtol:.1e}: error {now.fraction:.2g} of the requested accuracy")
-        if nearest is None or now.fraction < nearest.fraction:
-            nearest = now
-        if now.fraction <= ACCEPTED:
-            enough = now if enough is None or now.rtol > enough.rtol else enough
-            if now.fraction >= WASTEFUL or rtol >= LOOSEST_TOLERANCE:
-                return now
-        else:
-            too_loose = min(too_loose, rtol)
-            if rtol <= TIGHTEST_TOLERANCE:
-                break
-        rtol = _next(rtol, now.fraction, enough, too_loose)
-        if enough is not None and not search.saves(enough.rtol, rtol):
-            return enough
-        if enough is not None and too_loose < 1.05 * enough.rtol:
-            break  # the error jumps between two neighbouring tolerances
-    assert nearest is not None
-    return enough or nearest
-
-
-def _first(scene: Scene) -> float:
-    """Return a first tolerance: a tenth of the tightest relative request, or the scene's own tolerance."""
-    assert scene.accuracy is not None
-    fractions = [want.relative for want in scene.accuracy.quantities.values() if want.relative is not None]
-    guess = 0.1 * min(fractions) if fractions else scene.solver.rtol
-    return float(np.clip(guess, 100.0 * TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE))
-
-
-def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float) -> float:
-    """Return the next tolerance, rounded to two digits."""
-    if enough is not None and too_loose < math.inf:
-        return float(f"{math.sqrt(enough.rtol * too_loose):.1e}")
-    change = float(np.clip(AIM / max(fraction, 1e-300), 1e-3, 1e3))
-    return float(f"{np.clip(rtol * change, TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE):.1e}")
 
 
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
@@ -356,21 +289,21 @@ def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> st
     name = max(requested, key=lambda n: best.errors[n] / requested[n])
     error, times = best.errors[name], best.errors[name] / requested[name]
     text = f"missed: {name} has an error of {error:.2g}, {times:.2g} times the requested accuracy"
-    looser = min((r for r in search.runs if r > best.rtol), default=None)
+    looser = min((r for r in search.shown if r > best.rtol), default=None)
     if looser is None:
         return text
-    quantity = parse(name, search.scene.owners())
-    before = search.error(search.runs[looser], best.run, quantity)
-    if not best.errors[name] < STUCK * before:
-        until = _trusted_until(search, best, quantity, requested[name])
-        return f"{text}; tighter tolerances do not help{until}: the motion is chaotic or rounding decides"
+    quantity, run = parse(name, search.scene.owners()), search.shown[best.rtol]
+    until = float(run["horizon"]) if search.predictable and "horizon" in run else math.inf
+    if not best.errors[name] < STUCK * quantities.error(search.shown[looser], run, quantity, until):
+        until_then = _trusted_until(search, best, quantity, requested[name])
+        return f"{text}; tighter tolerances do not help{until_then}: the motion is chaotic or rounding decides"
     return f"{text}; this is the tightest tolerance"
 
 
 def _trusted_until(search: Search, best: Attempt, quantity: Quantity, requested: float) -> str:
     if not quantity.over_time:
         return ""
-    other = search.runs[min(search.runs, key=lambda r: (r == best.rtol, abs(math.log(r / best.rtol))))]
-    time, distance = quantities.deviation(best.run, other, quantity)
+    run, other = (search.shown[rtol] for rtol in (best.rtol, search.next_rung(best.rtol)))
+    time, distance = quantities.deviation(run, other, quantity)
     beyond = np.flatnonzero(distance > requested)
     return f" (it holds until t = {time[beyond[0]]:.4g} s)" if beyond.size else ""

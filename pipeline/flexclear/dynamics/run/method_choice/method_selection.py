@@ -204,11 +204,12 @@ class Costs:
             heir, most = self.heir(name, rtol)
             if not heir:
                 continue
-            every = max(int(LOOK_FRACTION * most), LEAST_LOOK)
             least = WORTH_STIFF
             if self.has_contacts and heir not in self.seen:
                 least = WORTH_COMPILING / CLEARLY_COSTLIER
-            panel[name] = (Judge(every, self._verdict(name, heir, max(most, least))), heir)
+            enough = max(most, least)
+            every = max(int(LOOK_FRACTION * enough), LEAST_LOOK)
+            panel[name] = (Judge(every, self._verdict(name, heir, enough)), heir)
         return panel
 
     def _verdict(self, name: str, heir: str, most: float) -> Callable[[Engine, Sequence[Look]], str]:

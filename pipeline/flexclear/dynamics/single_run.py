@@ -1,0 +1,49 @@
+"""The dataset of one run (schema RUN), up to a time or whole; with events it consists of phases, which are one part."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from flexclear.artifacts.labelled import Labelled, LabelledArrays
+from flexclear.artifacts.schema import incomplete
+from flexclear.dynamics.events import phases
+from flexclear.dynamics.record.dataset import recorded, warnings
+from flexclear.dynamics.run.progress_rate import Judges
+from flexclear.dynamics.run.run import Run, RunInParts
+from flexclear.scene.schema import Scene
+from flexclear.system.progress import Progress
+from flexclear.workflow import stopping
+
+
+class SingleRun:
+    """A run that is recorded in parts, as `RunInParts`, with the same errors; StoppedError holds the rows so far."""
+
+    def __init__(
+        self, scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, judges: Judges | None = None
+    ) -> None:
+        """Build and start a scene; arguments as of `RunInParts`."""
+        self._progress = progress
+        self._run: RunInParts | LabelledArrays
+        if scene.event:
+            self._run = phases.simulated(scene, bundles, progress, judges)
+        else:
+            self._run = RunInParts(scene, bundles, progress, judges)
+
+    def until(self, time: float) -> LabelledArrays:
+        """Return the run up to a time [s] or later, without predictability horizon."""
+        return self._recorded(self._run.until(time)) if isinstance(self._run, RunInParts) else self._run
+
+    def whole(self) -> LabelledArrays:
+        """Return the run to its end, with its horizon, and report its warnings."""
+        if not isinstance(self._run, RunInParts):
+            return self._run
+        done = self._run.whole()
+        result = self._recorded(done)
+        for sentence in warnings(done):
+            self._progress(None, f"warning: {sentence}")
+        return result
+
+    def _recorded(self, done: Run) -> LabelledArrays:
+        if done.stopped:
+            raise stopping.error(done.stopped, incomplete(recorded(done), done.stopped))
+        return recorded(done)
