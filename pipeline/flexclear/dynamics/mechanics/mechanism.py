@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import trees as t
 from flexclear.dynamics.mechanics.trees import Body, Coordinates, Motion, Resistance, Site, Step
-from flexclear.dynamics.mechanics.vectors import AT_REST, Twist
+from flexclear.dynamics.mechanics.vectors import AT_REST, Twist, Wrench
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell, routine
 from flexclear.dynamics.routines.symbols import select
 
@@ -21,12 +21,14 @@ Cells = Sequence[Cell]
 class Carrier:
     """The ground, or a link.
 
-    acceleration: its part from unknown rates of speeds.  beyond: of what it carries.  depth: links to the ground.
+    acceleration: its part from unknown rates of speeds.  beyond: of what it carries.  applied: by contacts and loads.
+    depth: links to the ground.
     """
 
     motion: Motion = field(init=False)
     acceleration: Twist = field(init=False, default=AT_REST)
     beyond: list[Resistance] = field(init=False, default_factory=list)
+    applied: Wrench | None = field(init=False, default=None)
     depth: int = field(init=False, default=0)
 
 
@@ -87,17 +89,32 @@ class Closure(NamedTuple):
     scales: Cells
 
 
-class Mechanism(NamedTuple):
-    """A mechanism. links: parents first, without the ground.  ledger: where its rates are stored.
+class Action(NamedTuple):
+    """A contact or a load. frames: those between which it acts, and others that it reads.
 
-    least_pivot: where the smallest pivot of the closures is stored.
+    routine: takes what is given and the frames' ends, and returns what is stored in `results`, the wrenches on the
+    bodies of the first two frames, and powers.  book: of the ledger, for the first of these.
+    """
+
+    routine: Callable
+    given: tuple[Any, ...]
+    frames: Sequence[Frame]
+    results: Cells
+    book: int = -1
+
+
+class Mechanism(NamedTuple):
+    """A mechanism. links: parents first, without the ground.  least_pivot: where the closures' smallest is stored.
+
+    ledger: where the rates are stored of those books that no action stores itself.
     """
 
     ground: Carrier
     links: Sequence[Link]
     closures: Sequence[Closure]
+    actions: Sequence[Action]
     gravity: Cells
-    ledger: Cells
+    ledger: Mapping[int, Cell]
     least_pivot: Cell
 
 
@@ -112,6 +129,7 @@ def evaluation(mechanism: Mechanism) -> CallList:
     """Return the calls that store the rates of the state, and what steps read besides (`specialise.program.KEPT`)."""
     with CallList().building() as calls:
         placed(mechanism)
+        supplied = acted(mechanism, calls)
         sound = eliminated(mechanism)
         least = closed(mechanism, calls) if mechanism.closures else 1.0
         for link in mechanism.links:
@@ -120,7 +138,7 @@ def evaluation(mechanism: Mechanism) -> CallList:
             else:
                 given = link.parent.acceleration, link.step, link.gains, link.forces
                 link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
-        calls.write(mechanism.ledger, powers(mechanism))
+        calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_drives(mechanism)]))
         calls.store([Cell(RESULTS, 0)], status, sound, least)
     return calls
 
@@ -130,6 +148,22 @@ def placed(mechanism: Mechanism) -> None:
     mechanism.ground.motion = t.ground(mechanism.gravity)
     for link in mechanism.links:
         link.motion, link.step = t.place(link.kind, link.parent.motion, link.site, link.coordinates)
+
+
+def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
+    """Apply contacts and loads to all bodies; return powers by their books."""
+    powers = list[tuple[int, Any]]()
+    for one in mechanism.actions:
+        ends = [(carrier.motion, site) for carrier, site in one.frames]
+        wrenches, supplied = calls.store(one.results, one.routine, *one.given, *ends)
+        for (carrier, _), wrench in zip(one.frames, wrenches, strict=False):
+            if isinstance(carrier, Link):
+                carrier.applied = t.added(carrier.applied, wrench) if carrier.applied else wrench
+        powers += [(one.book + k, power) for k, power in enumerate(supplied) if power != 0.0]
+    for link in mechanism.links:
+        if link.applied:
+            link.beyond.append(t.applied(link.applied))
+    return powers
 
 
 def eliminated(mechanism: Mechanism) -> Any:
@@ -221,11 +255,19 @@ def passed_inwards(ends: Iterable[tuple[Carrier, c.Wrenches]], gamma: t.Numbers)
     return found, gamma, S
 
 
-def powers(mechanism: Mechanism) -> list[Any]:
-    """Return the rates of the ledger: powers of the drives in their books, else zeros."""
-    sums: list[Any] = [0.0] * len(mechanism.ledger)
+def powers_of_drives(mechanism: Mechanism) -> list[tuple[int, Any]]:
+    """Return the powers of the drives by their books."""
+    powers = list[tuple[int, Any]]()
     for link in mechanism.links:
         if link.driven:
-            power = t.driving_power(link.step, link.rest, link.acceleration, link.closing, link.coordinates.u)
-            (sums[link.book],) = c.together([sums[link.book]], [power])
-    return sums
+            given = link.step, link.rest, link.acceleration, link.closing, link.coordinates.u
+            powers.append((link.book, t.driving_power(*given)))
+    return powers
+
+
+def booked(mechanism: Mechanism, powers: Iterable[tuple[int, Any]]) -> list[Any]:
+    """Return the rates of the ledger's books: sums of powers."""
+    sums: dict[int, Any] = dict.fromkeys(mechanism.ledger, 0.0)
+    for book, power in powers:
+        sums[book] = t.added(sums[book], power) if sums[book] else power
+    return list(sums.values())

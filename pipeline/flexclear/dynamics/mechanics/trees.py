@@ -62,6 +62,10 @@ class Site(NamedTuple):
     R_BS: Matrix
 
 
+#: where something acts: motion of a body, and a site on it
+End = tuple[Motion, Site]
+
+
 class Body(NamedTuple):
     """A rigid body. com [m], J: inertia about it [kg m^2], axes of the body.
 
@@ -116,6 +120,16 @@ def carried(body: Motion, site: Site) -> Motion:
 
 
 on_body = routine(carried)
+
+
+def moving(frame: Motion, p: Vector) -> Vector:
+    """Return the velocity of the point of a frame's body which is at p in the world."""
+    return frame.v + cross(frame.omega, p - frame.p_WB)
+
+
+def on_both(a: End, b: End, B: Motion, wrench: Wrench) -> tuple[Wrench, Wrench]:
+    """Return a wrench on b about the origin of B, the motion of b's site, and its opposite on a, about their bodies."""
+    return (wrench * -1.0).about(B.p_WB - a[0].p_WB), wrench.about(b[0].R_WB @ b[1].p_BS)
 
 
 @routine
@@ -181,6 +195,22 @@ def eliminate(carried_on: int, motion: Motion, body: Body, step: Step, beyond: S
         forces.append(root * rest)
         I, F = I.without(g, inverse), F + g * (inverse * rest)
     return carried_at(step, Resistance(I, F)) if carried_on else None, gains, forces, sound
+
+
+#: of what a load needs of the body on which it acts
+WITHOUT_INERTIA = Inertia(Symmetric([0.0] * 6), Matrix([0.0] * 9), Symmetric([0.0] * 6))
+
+
+@routine
+def added(one: Any, other: Any) -> Any:
+    """Return the sum of two wrenches or numbers."""
+    return one + other
+
+
+@routine
+def applied(wrench: Wrench) -> Resistance:
+    """Return the resistance that an applied wrench is: no inertia, and the need of its opposite."""
+    return Resistance(WITHOUT_INERTIA, wrench * -1.0)
 
 
 def carried_at(step: Step, rest: Resistance) -> Resistance:

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
+#: effects that routines know
+KNOWN_EFFECTS = {"stops", "wear", "bushings", "controllers"}
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
 
@@ -86,8 +88,8 @@ def address(
 
 
 def has_routines(parts: Parts) -> bool:
-    """Return True when routines know all parts of a mechanism: rigid bodies and ideal joints."""
-    return not (parts.surfaces or parts.loads or parts.effects or parts.flexible)
+    """Return True when routines know all parts of a mechanism: not flexible bodies, gears and friction of joints."""
+    return not parts.flexible and KNOWN_EFFECTS.issuperset(one.name for one in parts.present)
 
 
 def call_list(
