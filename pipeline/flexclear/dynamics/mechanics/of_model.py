@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism
-from flexclear.dynamics.mechanics.trees import Body, Coordinates, Site
+from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
+from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
+from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.routines.calls import RATES, SCENE, STATE, WORK, Cell, cells
@@ -16,32 +17,111 @@ from flexclear.dynamics.routines.calls import RATES, SCENE, STATE, WORK, Cell, c
 
 def mechanism_of(model: Model, h: np.ndarray) -> Mechanism:
     """Return the mechanism of a model; h: its topology with the closure rows to solve for and the offsets in w."""
-    ground, numbering = Carrier(), model.numbering
-    sites = [_site(h, k) for k in range(len(numbering.sites))]
-    carriers, links = [ground], list[Link]()
+    ground, table = Carrier(), model.arrays.table
+    carriers, frames, sites = (
+        [ground],
+        list[Frame](),
+        [*zip(*(table(m.SITES, h)[name].tolist() for name in ("link", "port")))],
+    )
+    flexible, links = dict(zip(table(m.FLEXES, h)["link"].tolist(), table(m.FLEXES, h), strict=True)), list[Link]()
+
+    def place(k: int) -> None:
+        """Add the frame of a site."""
+        link, port = sites[k]
+        frames.append(Frame(carriers[link], _site(h, m.SITE_NUMBERS, k) if port < 0 else _port(model, h, port)))
+
     for i, link in enumerate(model.links[1:], start=1):
-        given = carriers[link.branch.parent], link.kind, sites[i - 1], _body(h, i)
-        links.append(Link(*given, *_joint_state(model, h, i)))
+        place(i - 1)
+        numbers, modes = _numbers(h, m.LINK_NUMBERS, i), _modes(model, h, i, flexible[i]) if i in flexible else None
+        body = Body(numbers[0], Vector(numbers[1:4]), Symmetric(numbers[4:10]))
+        links.append(Link(frames[-1], link.kind, body, Bounds(*numbers[10:]), *_joint_state(model, h, i), modes))
         carriers.append(links[-1])
-    frames = [(carriers[site.link], own) for site, own in zip(numbering.sites, sites, strict=True)]
+    for k in range(len(links), len(sites)):
+        place(k)
     ledger = cells(RATES, model.nq + model.nv, model.arrays.size(m.N_LEDGER))
     gravity, least = _numbers(h, m.GRAVITY, 0), Cell(WORK, int(h[m.PIVOT]) + m.LAST_PIVOT)
     return Mechanism(ground, links, _closures(model, h, frames), gravity, ledger, least)
 
 
-def _numbers(h: np.ndarray, table: Any, row: int) -> list[Cell]:
-    """Return a row of a table of f."""
-    return cells(SCENE, int(h[table.at]) + table.size * row, table.size)
+def _numbers(h: np.ndarray, table: Any, row: int, count: int = 1) -> list[Cell]:
+    """Return rows of a table of f."""
+    return cells(SCENE, int(h[table.at]) + table.size * row, table.size * count)
 
 
-def _site(h: np.ndarray, k: int) -> Site:
-    numbers = _numbers(h, m.SITE_NUMBERS, k)
+def _site(h: np.ndarray, table: Any, k: int) -> Site:
+    numbers = _numbers(h, table, k)
     return Site(Vector(numbers[:3]), Matrix(numbers[3:]))
 
 
-def _body(h: np.ndarray, i: int) -> Body:
-    numbers = _numbers(h, m.LINK_NUMBERS, i)
-    return Body(numbers[0], Vector(numbers[1:4]), Symmetric(numbers[4:10]), *numbers[10:])
+class _Stretch:
+    """Numbers of a table of f that follow each other."""
+
+    def __init__(self, h: np.ndarray, table: Any, row: int) -> None:
+        self.h, self.table, self.row = h, table, int(row)
+
+    def rows(self, count: int, length: int) -> list[list[Cell]]:
+        """Return the next rows."""
+        found = _numbers(self.h, self.table, self.row, count * length)
+        self.row += count * length
+        return [found[length * k : length * (k + 1)] for k in range(count)]
+
+
+def _stiffened(model: Model) -> bool:
+    return "stiffening" in model.parts.effects
+
+
+def _second(model: Model, numbers: _Stretch, n: int) -> list[Any]:
+    """Return the next three forms of n modes; none where loads do not stiffen bodies."""
+    return [numbers.rows(n, n) for _ in range(3)] if _stiffened(model) else []
+
+
+def _port(model: Model, h: np.ndarray, p: int) -> Port:
+    port, undeformed = model.arrays.table(m.PORTS, h)[p], _site(h, m.PORT_NUMBERS, p)
+    body, numbers = model.arrays.table(m.FLEXES, h)[port["flex"]], _Stretch(h, m.PORT_DATA, port["shapes"])
+    n = int(body["n_modes"] - body["n_held"])
+    linear = [numbers.rows(3, n) for _ in range(2)]
+    second = [_second(model, numbers, n) for _ in range(2)]
+    return Port(undeformed.p_BS, undeformed.R_BS, *map(Shapes, linear, second))
+
+
+def _modes(model: Model, h: np.ndarray, i: int, body: Any) -> Modes:
+    table, n, held, u = model.arrays.table, int(body["n_modes"]), int(body["n_held"]), model.nq + int(body["c0"])
+    k, q = int(np.flatnonzero(table(m.FLEXES, h)["link"] == i)[0]), int(body["q0"])
+    inboard = int(table(m.LINKS, h)["inboard_port"][i])
+    of_body, data = _numbers(h, m.FLEX_NUMBERS, k), _Stretch(h, m.FLEX_DATA, body["data0"])
+    linear, E, _, diagonals = (data.rows(count, n) for count in (3, 9, n, 2))
+    in_shapes = _Stretch(h, m.INTERFACE_DATA, body["interface0"])
+    moved, mass = in_shapes.rows(3, n), in_shapes.rows(n, n)
+    coupled = [int(body["coupled"]) and i >= held for i in range(n)]
+    first, ends = int(body["moment_row0"]), table(m.MOMENT_ROWS, h)["end"]
+    begin, entries = int(body["moment0"]), range(int(body["basis0"]), int(body["basis0"] + body["n_basis"]))
+    rows = np.searchsorted(ends[first : first + 9 * n], np.arange(begin, ends[first + 9 * n - 1]), side="right")
+    modes = table(m.MOMENTS, h)["mode"][begin:]
+    modal = Modal(
+        of_body[0], Vector(of_body[1:4]), Matrix(of_body[4:13]), Symmetric(of_body[13:]),
+        Shapes(linear, _second(model, data, n)), E, *diagonals,
+        [tuple(_numbers(h, m.MOMENT_VALUES, begin + e)) for e in range(len(rows))],
+        _numbers(h, m.BASIS_VALUES, entries.start, len(entries)),
+        moved, [[mass[i][j] if i == j or coupled[i] else 0.0 for j in range(i + 1)] for i in range(n)],
+    )  # fmt: skip
+    return Modes(
+        _port(model, h, inboard) if body["inboard"] else _site(h, m.PORT_NUMBERS, inboard),
+        modal, *(cells(STATE, at, n) for at in (q, u)), [*cells(RATES, q, n), *cells(RATES, u, n)],
+        tuple((int(r) // n, int(mode), int(r) % n) for r, mode in zip(rows, modes)),
+        tuple((int(mode), int(shape)) for mode, shape in table(m.BASIS, h)[entries.start : entries.stop]),
+        held, _stations(model, h, k, n), int(body["book"]),
+    )  # fmt: skip
+
+
+def _stations(model: Model, h: np.ndarray, k: int, n: int) -> list[Station]:
+    """Return the stations of flexible body k."""
+    made = list[Station]()
+    for s, (flex, data) in enumerate(model.arrays.table(m.OF_EFFECTS["stations"], h).tolist()):
+        if flex == k:
+            numbers = _Stretch(h, m.OF_EFFECTS["station_data"], data)
+            stiffness = Symmetric(_numbers(h, m.OF_EFFECTS["station_stiffness"], s))
+            made.append(Station(numbers.rows(3, n), numbers.rows(3, n), stiffness))
+    return made
 
 
 def _joint_state(model: Model, h: np.ndarray, i: int) -> tuple[Coordinates, list[Cell], int]:
