@@ -1,15 +1,13 @@
 """Routines of contacts, stops and loads compute what kernels do: of random mechanisms, in contact and out of it."""
 
 from functools import cache
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.mechanism import build
-from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.dynamics.model.model import tabulate
 from flexclear.scene.clearance import FRICTIONS, NORMALS
 from flexclear.scene.clearance import SURFACES as JOINTS_WITH_SURFACES
 from flexclear.scene.loads import KINDS
@@ -26,14 +24,22 @@ NUMBERS = range(24)
 NORMAL: dict[str, Table] = {
     name: {"delivered_restitution": 0.7} for name in declared(NORMALS, key="law") if name != "hertz"
 }
-NORMAL |= {"hertz": {}, "kelvin-voigt": {"damping": 100.0, "stiffness": 1e7}, "flores": {"restitution": 0.6, "exponent": 1.3}}
+NORMAL |= {
+    "hertz": {},
+    "kelvin-voigt": {"damping": 100.0, "stiffness": 1e7},
+    "flores": {"restitution": 0.6, "exponent": 1.3},
+}
 IDEAL = ("revolute", "prismatic", "spherical", "cylindrical", "universal")
 LAW = {"type": "harmonic", "amplitude": 3.0, "frequency": 4.0, "phase": 0.3}
 #: of loads along a coordinate, between two frames, and on one
 ALONG: tuple[Table, ...] = (
     {"type": "joint-force", "force": LAW},
     {"type": "joint-spring", "stiffness": 40.0, "damping": 2.0, "rest": 0.2},
-    {"type": "joint-friction", "viscous": 0.4, "coulomb": {"static": 3.0, "dynamic": 2.0, "v_static": 0.01, "v_dynamic": 0.3}},
+    {
+        "type": "joint-friction",
+        "viscous": 0.4,
+        "coulomb": {"static": 3.0, "dynamic": 2.0, "v_static": 0.01, "v_dynamic": 0.3},
+    },
     {"type": "joint-friction", "viscous": 0.4},
     {"type": "pid", "reference": LAW, "proportional": 20.0, "integral": 9.0, "derivative": 2.0, "limits": [-9.0, 5.0]},
     {"type": "sampled-pid", "reference": 0.1, "proportional": 20.0, "period": 0.01},
@@ -41,8 +47,11 @@ ALONG: tuple[Table, ...] = (
 STIFF = np.diag([200.0, 300.0, 400.0, 5.0, 6.0, 7.0])
 BETWEEN: tuple[Table, ...] = (
     {"type": "spring-damper", "stiffness": 300.0, "damping": 5.0, "free_length": 0.4},
-    {"type": "line-expression", "force": "max(0, k * (length - l) + c * min(rate, v)) + f * abs(rate / v)",
-     "values": {"k": "200 N/m", "l": "0.9 m", "c": "2 N s/m", "v": "0.05 m/s", "f": "0.3 N"}},
+    {
+        "type": "line-expression",
+        "force": "max(0, k * (length - l) + c * min(rate, v)) + f * abs(rate / v)",
+        "values": {"k": "200 N/m", "l": "0.9 m", "c": "2 N s/m", "v": "0.05 m/s", "f": "0.3 N"},
+    },
     {"type": "bushing", "stiffness": STIFF.tolist(), "damping": (0.01 * STIFF).tolist()},
     {"type": "bushing", "stiffness": [*STIFF[:3].tolist(), *[[0.0] * 6] * 3], "damping": [[0.0] * 6] * 6},
 )
@@ -50,11 +59,17 @@ ON_ONE: tuple[Table, ...] = (
     {"type": "point-force", "force": [LAW, 1.0, 2.0]},
     {"type": "point-torque", "torque": [LAW, 1.0, 2.0], "axes": "frame"},
     {"type": "point-force", "force": [LAW, 1.0, 2.0], "axes": "frame"},
-    {"type": "point-expression", "force": "-c * norm(rod2.velocity) * rod2.velocity + k * (rod1.position - rod0.end1.position) / 2",
-     "values": {"c": "0.05 kg/m", "k": "20 N/m"}},
-    {"type": "point-expression", "axes": "frame",
-     "force": ["c * rod1.angular_velocity.y * (1 + sqrt(abs(rod1.velocity.z) / v))", "0", "a * sin(2 * w * t)^3"],
-     "values": {"c": "0.1 N s/rad", "v": "1 m/s", "a": "2 N", "w": "20 rad/s"}},
+    {
+        "type": "point-expression",
+        "force": "-c * norm(rod2.velocity) * rod2.velocity + k * (rod1.position - rod0.end1.position) / 2",
+        "values": {"c": "0.05 kg/m", "k": "20 N/m"},
+    },
+    {
+        "type": "point-expression",
+        "axes": "frame",
+        "force": ["c * rod1.angular_velocity.y * (1 + sqrt(abs(rod1.velocity.z) / v))", "0", "a * sin(2 * w * t)^3"],
+        "values": {"c": "0.1 N s/rad", "v": "1 m/s", "a": "2 N", "w": "20 rad/s"},
+    },
 )
 
 
@@ -98,7 +113,11 @@ def table(number: int) -> Table:
     single = [name for name, one in made["joint"].items() if one["type"] in ("revolute", "prismatic")]
     law = list(NORMAL)[number % len(NORMAL)]
     stop = {"joint": single[0], "lower": -0.4, "upper": 0.5, "normal": {"law": law, "stiffness": 1e5} | NORMAL[law]}
-    driven = {"turn": {"joint": single[-1], "law": {"type": "polynomial", "coefficients": [0.0, 0.3, 0.2]}}} if len(single) > 1 and number % 3 == 0 else {}
+    driven = (
+        {"turn": {"joint": single[-1], "law": {"type": "polynomial", "coefficients": [0.0, 0.3, 0.2]}}}
+        if len(single) > 1 and number % 3 == 0
+        else {}
+    )
     return made | {"load": loads(random, number, made["joint"]), "stop": {"end": stop}, "drive": driven}
 
 

@@ -15,7 +15,7 @@ from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
 from flexclear.dynamics.mechanics import closures, trees
-from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, _series
+from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
 from flexclear.dynamics.mechanics.mechanism import evaluation, status
 from flexclear.dynamics.mechanics.of_model import mechanism_of
 from flexclear.dynamics.mechanics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
@@ -41,7 +41,7 @@ from tests.properties import movable
 from tests.properties.articulated_chains import Evaluated, evaluated, rods, tabulated
 from tests.properties.mechanisms import two_loops
 from tests.properties.movable_units import UNITS
-from tests.properties.test_articulated import MIXED, TREES, apart, massless
+from tests.properties.test_articulated import BENT, MIXED, TREES, apart, massless
 
 #: of the largest rate of a kind; measured 5e-12 at worst: kernels refer wrenches to a distant origin
 ROUNDING = 1e-10
@@ -98,6 +98,12 @@ def assert_alike(found: Evaluated) -> None:
 @pytest.mark.parametrize("name", TREES)
 def test_trees_move_as_by_kernels(name: str) -> None:
     assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]), True)))
+
+
+@pytest.mark.parametrize("name", [name for name in BENT if "friction" not in name])
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_flexible_bodies_move_as_by_kernels(name: str) -> None:
+    assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]), True)))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -214,18 +220,18 @@ def test_positions_of_joints_are_those_that_poses_have(kind: str) -> None:
 
 def test_series_of_rotation_vectors_go_over_into_closed_forms() -> None:
     """The rates of the coefficients, which are differences over the squared angle of 0.01, lose four digits more."""
-    series, exact = (of(SERIES_ANGLE) for of in (_series, _closed))
-    assert series[:3] == pytest.approx(exact[:3], abs=1e-13)
-    assert series[3:] == pytest.approx(exact[3:], abs=1e-11)
+    found, exact = (of(SERIES_ANGLE) for of in (series, _closed))
+    assert found[:3] == pytest.approx(exact[:3], abs=1e-13)
+    assert found[3:] == pytest.approx(exact[3:], abs=1e-11)
 
 
 @pytest.mark.parametrize("mass, sound", [(1e-13, 1.0), (1e-15, 0.0), (np.nan, 0.0)])
 def test_a_coordinate_moves_mass_or_rounding(mass: float, sound: float) -> None:
     """As share of the mass that it carries; on floats."""
     still = trees.ground([0.0, 0.0, 0.0])
-    body = trees.Body(mass, ZERO, Symmetric([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), 1.0, 1.0)
+    body = trees.Body(mass, ZERO, Symmetric([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     step = trees.Step([trees.Twist(ZERO, Vector([0.0, 0.0, 1.0]))], ZERO)
-    assert trees.eliminate(0, still, body, step, [], 1.0)[-1] == sound
+    assert trees.eliminate(0, still, body, trees.Bounds(1.0, 1.0), step, [], 1.0)[-1] == sound
 
 
 @pytest.mark.parametrize(

@@ -100,9 +100,7 @@ def touch(
     """
     A, B = carried(*outer), carried(*inner)
     p = B.p_WB - A.p_WB
-    gap, approach, n, turning, offset = SURFACES[kinds.surfaces](
-        numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p)
-    )
+    gap, approach, n, turning, offset = SURFACES[kinds.surfaces](numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p))
     z = across(n, A.R_WB @ Vector(bristle)) if bristle else ZERO
     apart = Touch(gap, approach, offset=A.R_WB.T @ offset)
 

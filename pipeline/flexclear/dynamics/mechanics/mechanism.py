@@ -1,15 +1,27 @@
-"""A mechanism of rigid bodies as objects, and the calls that compute the rates of its state."""
+"""A mechanism of rigid and flexible bodies as objects, and the calls that compute the rates of its state."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures as c
+from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
-from flexclear.dynamics.mechanics.trees import Body, Coordinates, Motion, Resistance, Site, Step
+from flexclear.dynamics.mechanics.trees import (
+    Beyond,
+    Body,
+    Bounds,
+    Columns,
+    Coordinates,
+    Motion,
+    Resistance,
+    Site,
+    Step,
+)
 from flexclear.dynamics.mechanics.vectors import AT_REST, Twist, Wrench
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell, routine
 from flexclear.dynamics.routines.symbols import select
@@ -21,33 +33,100 @@ Cells = Sequence[Cell]
 class Carrier:
     """The ground, or a link.
 
-    acceleration: its part from unknown rates of speeds.  beyond: of what it carries.  applied: by contacts and loads.
-    depth: links to the ground.
+    acceleration: its part from unknown rates of speeds, for a flexible body as if that were rigid.  beyond: of what it
+    carries, and of forces on it.  depth: links to the ground.
     """
 
     motion: Motion = field(init=False)
     acceleration: Twist = field(init=False, default=AT_REST)
-    beyond: list[Resistance] = field(init=False, default_factory=list)
-    applied: Wrench | None = field(init=False, default=None)
+    beyond: list[Beyond] = field(init=False, default_factory=list)
     depth: int = field(init=False, default=0)
+
+
+@dataclass(eq=False)
+class Frame:
+    """A frame of a mechanism: what it is on, and its undeformed site there."""
+
+    carrier: Carrier
+    undeformed: Site | f.Port
+
+    @cached_property
+    def deformed(self) -> tuple[Site, Columns]:
+        """Its site on the body as that is deformed, and its motion per rate of each shape; once the body is placed."""
+        if isinstance(self.undeformed, Site):
+            return self.undeformed, ()
+        link, modes = self.carrier, self.carrier.modes
+        return f.at_port(modes.held, link.motion, modes.twists, self.undeformed, *modes.moving)
+
+    @property
+    def placed(self) -> tuple[Motion, Site]:
+        """The motion of its body, and its site there: what `trees.carried` takes."""
+        return self.carrier.motion, self.deformed[0]
+
+    @property
+    def acceleration(self) -> Twist:
+        """The part of the acceleration of its body with the frame that is from unknown rates of speeds."""
+        if not self.deformed[1]:
+            return self.carrier.acceleration
+        return f.follow(self.carrier.acceleration, self.deformed[1], self.carrier.modes.accelerations)
+
+    def resist(self, resistance: Resistance) -> None:
+        """Let the body resist, through this frame, what is about the origin of the body."""
+        self.carrier.beyond.append((resistance, self.deformed[1]))
+
+    def push(self, wrench: Wrench) -> None:
+        """Apply a wrench, about the origin of the body, to the body and its modes, before these are eliminated."""
+        self.resist(t.pushed(wrench))
+
+
+@dataclass(eq=False)
+class Modes:
+    """Modes of a flexible body. Its numbers are in memory.
+
+    inboard: frame of the body's joint on the body.  q, u: coordinates and their rates.  rates: where the rates of these
+    are stored.  places, basis: see `flexible.need`; held: shapes that move no frame.  stations: of a rod that loads
+    stiffen.  book: of the ledger, for the loss.  The others follow as `flexible` has them.
+    """
+
+    inboard: Site | f.Port
+    body: f.Modal
+    q: Cells
+    u: Cells
+    rates: Cells
+    places: f.Places
+    basis: f.Places
+    held: int
+    stations: Sequence[f.Station]
+    book: int
+    twists: Columns = field(init=False)
+    gains: f.Gains = field(init=False)
+    forces: t.Numbers = field(init=False)
+    accelerations: t.Numbers = field(init=False)
+
+    @cached_property
+    def moving(self) -> tuple[t.Numbers, t.Numbers]:
+        """Coordinates and rates of the moving shapes."""
+        q, u = (f.moving(self.basis, self.body.T, self.held, values) for values in (self.q, self.u))
+        return q, u
 
 
 @dataclass(eq=False)
 class Link(Carrier):
     """A body with the joint that carries it. Its numbers are in memory.
 
-    site: of the joint, on the parent.  rates: where those of its positions and speeds are stored.  book: of the ledger,
-    for its drives.  The others follow as `trees` has them; closing: wrenches of the closures on it and all beyond, by
-    rows, and the multipliers.
+    frame: of the joint, on the parent.  body: of a rigid body.  modes: of a flexible one.  rates: where those of its
+    positions and speeds are stored.  book: of the ledger, for its drives.  The others follow as `trees` has them;
+    closing: wrenches of the closures on it and all beyond, by rows, and the multipliers.
     """
 
-    parent: Carrier
+    frame: Frame
     kind: str
-    site: Site
     body: Body
+    bounds: Bounds
     coordinates: Coordinates
     rates: Cells = ()
     book: int = -1
+    modes: Modes | None = None
     step: Step = field(init=False)
     rest: Resistance = field(init=False)
     gains: t.Gains = field(init=False, default=())
@@ -55,7 +134,7 @@ class Link(Carrier):
     closing: list[tuple[c.Wrenches, t.Numbers]] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
-        self.depth = self.parent.depth + 1
+        self.depth = self.frame.carrier.depth + 1
 
     @property
     def driven(self) -> bool:
@@ -65,11 +144,7 @@ class Link(Carrier):
     @property
     def on_link(self) -> bool:
         """True when another link carries it."""
-        return isinstance(self.parent, Link)
-
-
-#: a frame of a mechanism: what it is on, and its site there
-Frame = tuple[Carrier, Site]
+        return isinstance(self.frame.carrier, Link)
 
 
 class Closure(NamedTuple):
@@ -134,11 +209,14 @@ def evaluation(mechanism: Mechanism) -> CallList:
         least = closed(mechanism, calls) if mechanism.closures else 1.0
         for link in mechanism.links:
             if link.driven:
-                link.acceleration = t.follow(link.parent.acceleration, link.step)
+                link.acceleration = t.follow(link.frame.acceleration, link.step)
             else:
-                given = link.parent.acceleration, link.step, link.gains, link.forces
+                given = link.frame.acceleration, link.step, link.gains, link.forces
                 link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
-        calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_drives(mechanism)]))
+            if modes := link.modes:
+                given = modes.basis, modes.body.T, modes.u, modes.gains, modes.forces, link.acceleration
+                modes.accelerations = calls.store(modes.rates, f.accelerate, *given)
+        calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_links(mechanism)]))
         calls.store([Cell(RESULTS, 0)], status, sound, least)
     return calls
 
@@ -147,22 +225,27 @@ def placed(mechanism: Mechanism) -> None:
     """Compute the motion of all links, with the known part of their accelerations."""
     mechanism.ground.motion = t.ground(mechanism.gravity)
     for link in mechanism.links:
-        link.motion, link.step = t.place(link.kind, link.parent.motion, link.site, link.coordinates)
+        link.motion, link.step = t.place(link.kind, *link.frame.placed, link.coordinates)
+        if modes := link.modes:
+            given = modes.held, link.motion, link.step, modes.inboard, *modes.moving
+            link.motion, link.step, modes.twists = f.body_of(*given)
 
 
 def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
     """Apply contacts and loads to all bodies; return powers by their books."""
-    powers = list[tuple[int, Any]]()
+    powers, rigidly = list[tuple[int, Any]](), dict[Link, Wrench]()
     for one in mechanism.actions:
-        ends = [(carrier.motion, site) for carrier, site in one.frames]
+        ends = [frame.placed for frame in one.frames]
         wrenches, supplied = calls.store(one.results, one.routine, *one.given, *ends)
-        for (carrier, _), wrench in zip(one.frames, wrenches, strict=False):
-            if isinstance(carrier, Link):
-                carrier.applied = t.added(carrier.applied, wrench) if carrier.applied else wrench
+        for frame, wrench in zip(one.frames, wrenches, strict=False):
+            link = frame.carrier
+            if frame.deformed[1]:
+                frame.push(wrench)
+            elif isinstance(link, Link):
+                rigidly[link] = t.added(rigidly[link], wrench) if link in rigidly else wrench
         powers += [(one.book + k, power) for k, power in enumerate(supplied) if power != 0.0]
-    for link in mechanism.links:
-        if link.applied:
-            link.beyond.append(t.applied(link.applied))
+    for link, wrench in rigidly.items():
+        link.beyond.append((t.pushed(wrench), ()))
     return powers
 
 
@@ -170,38 +253,48 @@ def eliminated(mechanism: Mechanism) -> Any:
     """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass."""
     sound: Any = 1.0
     for link in reversed(mechanism.links):
-        if link.driven:
+        carried_on = int(link.on_link)
+        if modes := link.modes:
+            more: Any = [0.0] * len(modes.q)
+            for station in modes.stations:
+                more = f.bend(more, station, modes.q)
+            need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
+            modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
+        elif link.driven:
             link.rest = t.resist(link.motion, link.body, link.beyond)
+        if link.driven:
             rest = t.carry(link.step, link.rest) if link.on_link else None
+        elif link.modes:
+            rest, link.gains, link.forces, sound = t.free_joint(carried_on, link.rest, link.bounds, link.step, sound)
         else:
-            given = int(link.on_link), link.motion, link.body, link.step, link.beyond, sound
+            given = carried_on, link.motion, link.body, link.bounds, link.step, link.beyond, sound
             rest, link.gains, link.forces, sound = t.eliminate(*given)
         if rest:
-            link.parent.beyond.append(rest)
+            link.frame.resist(rest)
     return sound
 
 
 def closed(mechanism: Mechanism, calls: CallList) -> Any:
     """Add the closures' forces to those of all links; return the smallest pivot of their matrix."""
-    found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link, list[int]]()
+    found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
     for one in mechanism.closures:
-        kept, frames = len(one.scales), [(link.motion, site) for link, site in (one.a, one.b)]
-        gamma, *wrenches = calls.store(one.residuals, c.closure, one.rows, kept, *frames)
+        kept, frames = len(one.scales), (one.a, one.b)
+        gamma, *wrenches = calls.store(one.residuals, c.closure, one.rows, kept, *(frame.placed for frame in frames))
         if not kept:
             continue
-        i, ends = len(found), zip((one.a[0], one.b[0]), wrenches, strict=True)
-        mine, gamma, S[i, i] = passed_inwards(ends, gamma)
-        for link, V in mine.V.items():
-            for k in moved_by.setdefault(link, []):
+        i = len(found)
+        mine, gamma, S[i, i] = passed_inwards(list(zip(frames, wrenches, strict=True)), gamma)
+        for moved, V in mine.V.items():
+            for k in moved_by.setdefault(moved, []):
                 before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
-                S[i, k] = c.coupled(before, V, found[k].V[link])
-            moved_by[link].append(i)
+                S[i, k] = c.coupled(before, V, found[k].V[moved])
+            moved_by[moved].append(i)
         found.append(mine)
         right.append(gamma)
     L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
     for mine, multipliers in zip(found, c.solved(L, right), strict=True):
-        for link, V in mine.V.items():
-            link.forces = c.with_multipliers(link.forces, V, multipliers)
+        for moved, V in mine.V.items():
+            moved.forces = c.with_multipliers(moved.forces, V, multipliers)
         for link, on_it in mine.driven.items():
             link.closing.append((on_it, multipliers))
     calls.write([mechanism.least_pivot], [least])
@@ -224,26 +317,31 @@ def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tup
 
 
 class Spread(NamedTuple):
-    """Rows of a closure passed from its ends to the ground: V by link, and wrenches on links with drives."""
+    """Rows of a closure passed from its ends to the ground: V by what it moves, and wrenches on links with drives."""
 
-    V: dict[Link, c.Rows]
+    V: dict[Link | Modes, c.Rows]
     driven: dict[Link, c.Wrenches]
 
 
-def passed_inwards(ends: Iterable[tuple[Carrier, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
-    """Return V = L^-1 J^T of the rows of a closure, gamma - V^T L^-1 f, and V^T V; ends: links and wrenches on them."""
-    found, waiting = Spread({}, {}), dict[Link, c.Wrenches]()
+def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
+    """Return V = L^-1 J^T of the rows of a closure, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
+    found, waiting, loads = Spread({}, {}), dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
     S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
 
-    def receive(link: Carrier, wrenches: c.Wrenches) -> None:
+    def receive(frame: Frame, wrenches: c.Wrenches) -> None:
+        link = frame.carrier
         if isinstance(link, Link):
             waiting[link] = c.together(waiting[link], wrenches) if link in waiting else wrenches
+            loads.setdefault(link, []).append((wrenches, frame.deformed[1]))
 
-    for link, wrenches in ends:
-        receive(link, wrenches)
+    for frame, wrenches in ends:
+        receive(frame, wrenches)
     while waiting:
         link = max(waiting, key=lambda link: link.depth)
         wrenches, carried_on = waiting.pop(link), int(link.on_link)
+        if modes := link.modes:
+            given = modes.gains, modes.forces, loads[link], wrenches, gamma, S
+            found.V[modes], gamma, S, wrenches = f.spread(*given)
         if link.driven:
             found.driven[link] = wrenches
         if link.gains:
@@ -251,17 +349,19 @@ def passed_inwards(ends: Iterable[tuple[Carrier, c.Wrenches]], gamma: t.Numbers)
             found.V[link], gamma, S, passed = c.spread(*given)
         else:
             passed = c.inwards(link.step, wrenches) if carried_on else []
-        receive(link.parent, passed)
+        receive(link.frame, passed)
     return found, gamma, S
 
 
-def powers_of_drives(mechanism: Mechanism) -> list[tuple[int, Any]]:
-    """Return the powers of the drives by their books."""
+def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
+    """Return the powers of drives, and those lost to damping of modes, by their books."""
     powers = list[tuple[int, Any]]()
     for link in mechanism.links:
         if link.driven:
             given = link.step, link.rest, link.acceleration, link.closing, link.coordinates.u
             powers.append((link.book, t.driving_power(*given)))
+        if modes := link.modes:
+            powers.append((modes.book, f.damping_power(modes.body.damping, modes.u)))
     return powers
 
 

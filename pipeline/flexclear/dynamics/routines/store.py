@@ -27,7 +27,9 @@ DYNAMICS = "flexclear.dynamics"
 #: modules that make code of a tape; and those that make lists
 EMITTING = ("routines.emission", "specialise.code")
 LISTING = (*EMITTING, "memory", "specialise.tape", *(f"routines.{name}" for name in ("calls", "store", "symbols")))
-LISTING += tuple(f"mechanics.{name}" for name in ("closures", "joints", "mechanism", "of_model", "trees", "vectors"))
+LISTING += tuple(
+    f"mechanics.{name}" for name in ("closures", "flexible", "joints", "mechanism", "of_model", "trees", "vectors")
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,9 @@ sqrt, sin, cos, tan, exp, log, tanh = (
     _function(name, getattr(math, name)) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")
 )
 arctan2, nearest, copysign = (
-    _function("arctan2", math.atan2), _function("round", round), _function("copysign", math.copysign)
+    _function("arctan2", math.atan2),
+    _function("round", round),
+    _function("copysign", math.copysign),
 )
 
 

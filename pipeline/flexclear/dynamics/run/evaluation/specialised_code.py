@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _making = Lock()
 #: effects that routines know
-KNOWN_EFFECTS = {"stops", "wear", "bushings", "controllers"}
+KNOWN_EFFECTS = {"stiffening", "stops", "wear", "bushings", "controllers"}
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
 
@@ -88,8 +88,8 @@ def address(
 
 
 def has_routines(parts: Parts) -> bool:
-    """Return True when routines know all parts of a mechanism: not flexible bodies, gears and friction of joints."""
-    return not parts.flexible and KNOWN_EFFECTS.issuperset(one.name for one in parts.present)
+    """Return True when routines know all parts of a mechanism: not gears and friction of ideal joints."""
+    return KNOWN_EFFECTS.issuperset(one.name for one in parts.present)
 
 
 def call_list(
