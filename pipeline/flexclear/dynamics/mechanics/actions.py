@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -58,8 +59,7 @@ def _contacts(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Action]:
 def _gauge(model: Model, k: int) -> tuple[Gauge, list[Cell], list[Cell]]:
     """Return a gauge, with the angle whose full turns it counts, and where the rate of that is stored."""
     row = model.arrays.table(m.GAUGES)[k]
-    turns, rates = _internal(model, int(row["turns"]), 1)
-    return Gauge(*(int(row[name]) for name in Gauge._fields)), turns, rates
+    return Gauge(*(int(row[name]) for name in Gauge._fields)), *_internal(model, int(row["turns"]), 1)
 
 
 def _internal(model: Model, first: int, count: int) -> tuple[list[Cell], list[Cell]]:
@@ -69,49 +69,56 @@ def _internal(model: Model, first: int, count: int) -> tuple[list[Cell], list[Ce
     return state, rates
 
 
+class _Reading:
+    """Frames between which a load acts, then others that it reads; its coordinates; where rates of turns are stored."""
+
+    def __init__(self, model: Model, frames: list[Frame], between: list[Frame]) -> None:
+        self.model, self.sites, self.frames = model, frames, between
+        self.gauged, self.rates = list[tuple[Gauge, list[Cell], int, int]](), list[Cell]()
+
+    def frame(self, site: int) -> int:
+        """Return the number of a site's frame."""
+        if self.sites[site] not in self.frames:
+            self.frames.append(self.sites[site])
+        return self.frames.index(self.sites[site])
+
+    def coordinate(self, k: int) -> int:
+        """Add a coordinate by its gauge, and return its number."""
+        gauge, turns, rates = _gauge(self.model, k)
+        row = self.model.arrays.table(m.GAUGES)[k]
+        self.gauged.append((gauge, turns, self.frame(row["a"]), self.frame(row["b"])))
+        self.rates += rates
+        return len(self.gauged) - 1
+
+
 def _loads(model: Model, h: np.ndarray, world: Frame, frames: list[Frame]) -> list[Action]:
     """Return all loads, with the places of their numbers, laws and states, and of what they store."""
-    tables = [model.arrays.table(one) for one in (m.LOADS, m.LOAD_KINDS, m.LOOKS, m.GAUGES)]
-    rows, kinds, looks, gauges = tables
-    kind_of = [
-        name.split(maxsplit=1)
-        for name, one in zip(model.parts.loads, kinds, strict=True)
-        for _ in range(one["n_loads"])
-    ]
+    rows, kinds, looks = (model.arrays.table(one) for one in (m.LOADS, m.LOAD_KINDS, m.LOOKS))
+    names = [name for name, one in zip(model.parts.loads, kinds, strict=True) for _ in range(one["n_loads"])]
     ends = {"law0": model.arrays.size(m.N_LAWS), "number0": len(model.arrays.table(m.LOAD_NUMBERS))}
     ends |= {"look0": len(looks), "bend0": model.arrays.size(m.N_LOAD_BENDS)}
+    spans = [list(pairwise([*rows[name].tolist(), end])) for name, end in ends.items()]
     made = list[Action]()
-    for k, (row, kind) in enumerate(zip(rows, kind_of, strict=True)):
-        spans = [
-            range(int(row[name]), int(rows[k + 1][name] if k + 1 < len(rows) else end)) for name, end in ends.items()
-        ]
-        numbers = cells(SCENE, int(h[m.LOAD_NUMBERS.at]) + spans[1].start, len(spans[1]))
-        laws = [Law(*_row(h, m.LAW, i, WORK)[:2]) for i in spans[0]]
-        states, results = _internal(model, int(row["internal0"]), STATES.get(kind[0], 0))
-        between = [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]]
-        gauged, read = list[Any](), list[tuple[int, int]]()
-
-        def measure(g: int) -> int:
-            """Append a coordinate; return its number."""
-            gauge, turns, rates = _gauge(model, g)
-            gauged.append((gauge, turns, *(place(int(gauges[g][side])) for side in ("a", "b"))))
-            results.extend(rates)
-            return len(gauged) - 1
-
-        def place(site: int) -> int:
-            """Return the number of a site among the ends, after appending it if it is new."""
-            if frames[site] not in between:
-                between.append(frames[site])
-            return between.index(frames[site])
-
-        for name in ("gauge", "measured"):
-            if row[name] >= 0:
-                measure(int(row[name]))
-        for i, look in enumerate(spans[2]):
-            index = int(looks[look]["index"])
-            coordinate = any(token in (f"q{i}", f"r{i}") for token in kind[-1].split())
-            read.append((1, measure(index)) if coordinate else (0, place(index)))
-        results += cells(WORK, int(h[m.LOAD_BENDS.at]) + spans[3].start, len(spans[3]))
-        given = tuple(kind), int(row["follows"]), numbers, laws, states, gauged, read
-        made.append(Action(act, given, between, results, int(row["book"])))
+    for row, name, law, number, look, bend in zip(rows, names, *spans, strict=True):
+        kind = tuple(name.split(maxsplit=1))
+        states, rates = _internal(model, int(row["internal0"]), STATES.get(kind[0], 0))
+        reading = _Reading(model, frames, [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]])
+        for k in (row["gauge"], row["measured"]):
+            if k >= 0:
+                reading.coordinate(k)
+        read = []
+        for i, index in enumerate(looks["index"][slice(*look)].tolist()):
+            joint = {f"q{i}", f"r{i}"}.intersection(name.split())
+            read.append((1, reading.coordinate(index)) if joint else (0, reading.frame(index)))
+        given = (
+            kind,
+            int(row["follows"]),
+            cells(SCENE, int(h[m.LOAD_NUMBERS.at]) + number[0], number[1] - number[0]),
+            [Law(*_row(h, m.LAW, k, WORK)[:2]) for k in range(*law)],
+            states,
+            reading.gauged,
+            read,
+        )
+        bends = [cell for k in range(*bend) for cell in _row(h, m.LOAD_BENDS, k, WORK)]
+        made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
     return made

@@ -56,7 +56,7 @@ class Load(NamedTuple):
     bends: Numbers = ()
 
 
-# Along a joint coordinate ---------------------------------------------------------------------------------------------
+# Along a joint coordinate -------------------------------------------------------------------------------------------
 def pushing(given: Given, size: Any) -> Load:
     """Return a load of given size along the coordinate; all of its power is work."""
     _, rate, unit = given.coordinates[0]
@@ -107,7 +107,7 @@ def joint_expression(given: Given, formula: str) -> Load:
     return pushing(given, size)._replace(bends=bends)
 
 
-# Between two points -----------------------------------------------------------------------------------------------------
+# Between two points ---------------------------------------------------------------------------------------------------
 def line(given: Given) -> tuple[Any, Any, Vector, Vector]:
     """Return the distance of the origins, its rate, its direction (zero where they coincide), and the whole vector."""
     r = given.G.p_WB - given.F.p_WB
@@ -135,7 +135,7 @@ def mount(given: Given) -> Load:
     return Load(*bushing(given.numbers, given.states, given.F, given.G))
 
 
-# On one point -----------------------------------------------------------------------------------------------------------
+# On one point ---------------------------------------------------------------------------------------------------------
 def point_force(given: Given) -> Load:
     """Return a force by three laws of time."""
     force = given.R_WL @ Vector([law.value for law in given.laws])
@@ -155,7 +155,7 @@ def point_expression(given: Given, formula: str) -> Load:
     return Load(Wrench(ZERO, force), dot(force, given.G.v), bends=bends)
 
 
-# Expressions ------------------------------------------------------------------------------------------------------------
+# Expressions ----------------------------------------------------------------------------------------------------------
 #: operations on numbers, or on vectors where these may be
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "+": lambda a, b: a + b,
