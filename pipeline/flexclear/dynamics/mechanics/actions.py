@@ -122,3 +122,15 @@ def _loads(model: Model, h: np.ndarray, world: Frame, frames: list[Frame]) -> li
         bends = [cell for k in range(*bend) for cell in _row(h, m.LOAD_BENDS, k, WORK)]
         made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
     return made
+
+
+def gear(model: Model, h: np.ndarray, frames: list[Frame], k: int) -> tuple[tuple[Any, ...], list[Frame], list[Cell]]:
+    """Return what `gears.coupling` is given of a gear, the frames of both joints, and where rates of turns are stored.
+
+    The second joint comes first.
+    """
+    rows, gauges = model.arrays.table(m.NAMED["couplings"])[k], model.arrays.table(m.GAUGES)
+    which = [int(rows[side]) for side in ("second", "first")]
+    how, turns, rates = zip(*(_gauge(model, g) for g in which), strict=True)
+    joints = [frames[gauges[g][end]] for g in which for end in ("a", "b")]
+    return (how, turns, *_row(h, m.NAMED["coupling_numbers"], k, SCENE)), joints, [cell for one in rates for cell in one]

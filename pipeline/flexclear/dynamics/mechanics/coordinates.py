@@ -41,3 +41,14 @@ def along(gauge: Gauge, turns: Numbers, F: Motion, G: Motion) -> Along:
         return Along(angle, dot(axis, G.omega - F.omega), Wrench(axis, ZERO))
     r = G.p_WB - F.p_WB
     return Along(dot(axis, r), dot(axis, G.v - F.v - cross(F.omega, r)), Wrench(ZERO, axis))
+
+
+def bias(gauge: Gauge, F: Motion, G: Motion) -> Any:
+    """Return the known part of the second rate of the coordinate between frames."""
+    side = G if gauge.side else F
+    axis = side.R_WB.column(gauge.axis)
+    if gauge.turning:
+        return dot(axis, G.alpha - F.alpha) + dot(cross(side.omega, axis), G.omega - F.omega)
+    r = G.p_WB - F.p_WB
+    swing = cross(F.omega, r)
+    return dot(axis, G.a - F.a - cross(F.alpha, r) - cross(F.omega, 2.0 * (G.v - F.v) - swing))

@@ -148,17 +148,18 @@ class Link(Carrier):
 
 
 class Closure(NamedTuple):
-    """A joint that closes a loop, between frames a and b.
+    """A joint that closes a loop, or a gear. frames: on whose bodies its rows act.
 
-    rows: see `closures.row`; those solved for come first.  residuals: where those of all rows and their rates are
-    stored.  diagonal, roots: of the rows solved for, where the diagonal of J M^-1 J^T and of its inverse factor are
-    stored.  scales: reference of each pivot.
+    routine: takes what is given, the number of rows solved for, and the frames' ends, and returns what is stored in
+    `results`, then gamma of those rows and their wrenches on each body; see `closures.closure`.  diagonal, roots: of
+    the rows solved for, where the diagonal of J M^-1 J^T and of its inverse factor are stored.  scales: reference of
+    each pivot.
     """
 
-    a: Frame
-    b: Frame
-    rows: tuple[tuple[int, int, int], ...]
-    residuals: Cells
+    routine: Callable
+    given: tuple[Any, ...]
+    frames: Sequence[Frame]
+    results: Cells
     diagonal: Cells
     roots: Cells
     scales: Cells
@@ -278,12 +279,12 @@ def closed(mechanism: Mechanism, calls: CallList) -> Any:
     """Add the closures' forces to those of all links; return the smallest pivot of their matrix."""
     found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
     for one in mechanism.closures:
-        kept, frames = len(one.scales), (one.a, one.b)
-        gamma, *wrenches = calls.store(one.residuals, c.closure, one.rows, kept, *(frame.placed for frame in frames))
+        kept, ends = len(one.scales), (frame.placed for frame in one.frames)
+        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *ends)
         if not kept:
             continue
         i = len(found)
-        mine, gamma, S[i, i] = passed_inwards(list(zip(frames, wrenches, strict=True)), gamma)
+        mine, gamma, S[i, i] = passed_inwards(list(zip(one.frames, wrenches, strict=True)), gamma)
         for moved, V in mine.V.items():
             for k in moved_by.setdefault(moved, []):
                 before = S.get((i, k)) or [[0.0] * len(right[k])] * kept

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics.actions import actions_of
+from flexclear.dynamics.mechanics.actions import actions_of, gear
+from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
+from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
@@ -41,10 +43,11 @@ def mechanism_of(model: Model, h: np.ndarray) -> Mechanism:
         place(k)
     actions = actions_of(model, h, ground, frames)
     gravity, least = _numbers(h, m.GRAVITY, 0), Cell(WORK, int(h[m.PIVOT]) + m.LAST_PIVOT)
-    stored = {cell.key for one in actions for cell in one.results}
+    closures = _closures(model, h, frames)
+    stored = {cell.key for one in (*actions, *closures) for cell in one.results}
     books = enumerate(cells(RATES, model.nq + model.nv, model.arrays.size(m.N_LEDGER)))
     ledger = {book: cell for book, cell in books if cell.key not in stored}
-    return Mechanism(ground, links, _closures(model, h, frames), actions, gravity, ledger, least)
+    return Mechanism(ground, links, closures, actions, gravity, ledger, least)
 
 
 def _numbers(h: np.ndarray, table: Any, row: int, count: int = 1) -> list[Cell]:
@@ -149,6 +152,11 @@ def _closures(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Closure]
         diagonal = cells(WORK, scales[0].index + model.arrays.size(m.N_CLOSURE_ROWS), kept) if kept else []
         roots = [Cell(WORK, int(h[m.SCHUR] + origins[r]) + r) for r in range(kept0, kept0 + kept)]
         residuals = [cell for at in (m.RESIDUAL, m.RESIDUAL_RATE) for cell in cells(WORK, int(h[at]) + row0, count)]
-        a, b = frames[one["site_a"]], frames[one["site_b"]]
-        made.append(Closure(a, b, tuple(rows[row0 : row0 + count]), residuals, diagonal, roots, scales))
+        factor, of_joint = (diagonal, roots, scales), (tuple(rows[row0 : row0 + count]),)
+        if one["coupling"] >= 0:
+            given, joined, turning = gear(model, h, frames, int(one["coupling"]))
+            made.append(Closure(coupling, given, joined, [*residuals, *turning], *factor))
+        else:
+            joined = [frames[one["site_a"]], frames[one["site_b"]]]
+            made.append(Closure(closure, of_joint, joined, residuals, *factor))
     return made
