@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -9,10 +10,11 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.effects.wear.contact import LEDGER
+from flexclear.dynamics.mechanics.bearings import Bearing, BearingNumbers
 from flexclear.dynamics.mechanics.contacts import ContactNumbers, Kinds, stop, touch
 from flexclear.dynamics.mechanics.coordinates import Gauge
 from flexclear.dynamics.mechanics.loads import STATES, Law, act
-from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame
+from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link, Rubbed, Rubbing
 from flexclear.dynamics.mechanics.trees import Site
 from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
 from flexclear.dynamics.model.model import Model
@@ -133,4 +135,29 @@ def gear(model: Model, h: np.ndarray, frames: list[Frame], k: int) -> tuple[tupl
     which = [int(rows[side]) for side in ("second", "first")]
     how, turns, rates = zip(*(_gauge(model, g) for g in which), strict=True)
     joints = [frames[gauges[g][end]] for g in which for end in ("a", "b")]
-    return (how, turns, *_row(h, m.NAMED["coupling_numbers"], k, SCENE)), joints, [cell for one in rates for cell in one]
+    return (
+        (how, turns, *_row(h, m.NAMED["coupling_numbers"], k, SCENE)),
+        joints,
+        [cell for one in rates for cell in one],
+    )
+
+
+def rubbing_of(model: Model, h: np.ndarray, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
+    """Return the friction of ideal joints, whose links are marked; carriers: the ground, then all links."""
+    table, laws, made = model.arrays.table, model.parts.kinds("joint_friction"), list[Rubbing]()
+    slot = model.arrays.size(m.SIZES["joint_friction_slot"])
+    for k, row in enumerate(table(m.NAMED["rubbing"])):
+        bearings = []
+        for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
+            one, numbers = table(m.NAMED["bearings"])[e], _row(h, m.NAMED["bearing_numbers"], e, SCENE)
+            what = Bearing(int(one["kind"]), laws[one["law"]], int(one["side"]), int(one["axis"]))
+            bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
+            bends, load = _row(h, m.NAMED["bends"], e, WORK), _row(h, m.NAMED["bearing"], e, WORK)[0]
+            given = BearingNumbers(*numbers[:5], numbers[5:])
+            bearings.append(Rubbed(what, given, bristle, [*bends[:3], *rate], load, bends[3:]))
+        link = carriers[row["link"]] if row["link"] >= 0 else None
+        if isinstance(link, Link):
+            link.rubbed = True
+        joint, second = (frames[row["site_a"]], frames[row["site_b"]]), -1 if row["reversed"] else 1
+        made.append(Rubbing(joint, link, second, int(row["closure"]), bearings, slot + k))
+    return made

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics.actions import actions_of, gear
+from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
 from flexclear.dynamics.mechanics.gears import coupling
@@ -43,11 +43,12 @@ def mechanism_of(model: Model, h: np.ndarray) -> Mechanism:
         place(k)
     actions = actions_of(model, h, ground, frames)
     gravity, least = _numbers(h, m.GRAVITY, 0), Cell(WORK, int(h[m.PIVOT]) + m.LAST_PIVOT)
-    closures = _closures(model, h, frames)
+    closures, rubbing = _closures(model, h, frames), rubbing_of(model, h, frames, carriers)
     stored = {cell.key for one in (*actions, *closures) for cell in one.results}
+    stored |= {cell.key for joint in rubbing for one in joint.bearings for cell in one.sliding}
     books = enumerate(cells(RATES, model.nq + model.nv, model.arrays.size(m.N_LEDGER)))
     ledger = {book: cell for book, cell in books if cell.key not in stored}
-    return Mechanism(ground, links, closures, actions, gravity, ledger, least)
+    return Mechanism(ground, links, closures, actions, rubbing, gravity, ledger, least)
 
 
 def _numbers(h: np.ndarray, table: Any, row: int, count: int = 1) -> list[Cell]:

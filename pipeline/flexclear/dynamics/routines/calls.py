@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.code import Program
-from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, Branch, Symbol
+from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, Branch, Loop, Symbol
 
 #: numbers of the scene, the state, its rates, the work space of the engine, the results of the list's own calls, and
 #: the modes of the contacts, which are integers
@@ -229,6 +229,14 @@ def _described(program: Program) -> Iterator[Any]:
                 for joined, *both in item.joins:
                     numbers[joined] = len(numbers)
                     yield "join", joined.kind, *map(name, both)
+            elif isinstance(item, Loop):
+                yield "loop", *(name(one.first) for one in item.carried)
+                for one in item.carried:
+                    numbers[one.inside] = len(numbers)
+                yield from block(item.blocks[0])
+                yield "left", name(item.condition), *(name(one.left) for one in item.carried)
+                for one in item.carried:
+                    numbers[one.after] = len(numbers)
             else:
                 numbers[item] = len(numbers)
                 yield item.kind, item.operation, *map(name, item.arguments)

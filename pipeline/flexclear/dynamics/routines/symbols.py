@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from flexclear.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape
+from flexclear.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape
 from flexclear.dynamics.specialise.trace import Trace
 
 
@@ -93,6 +93,25 @@ def branch(condition: Any, first: Callable[[], Any], second: Callable[[], Any]) 
     tape.block.append(made)
     a, b = map(leaves, ways)
     return rebuilt(ways[0], iter([tape.join(made, *both) for both in zip(a, b, strict=True)]))
+
+
+def repeat(turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
+    """Return the state, nested tuples of numbers, after turn(state) -> (condition, state) as long as that holds."""
+    symbol = next((one for one in leaves(state) if isinstance(one, Symbol)), None)
+    if symbol is None:
+        going = True
+        while going:
+            going, state = turn(state)
+        return state
+    tape = symbol.tape
+    carried = [tape.carry(first) for first in leaves(state)]
+    made = Loop(([],), carried)
+    with tape.inside(made.blocks[0]):
+        made.condition, after = turn(rebuilt(state, iter([one.inside for one in carried])))
+    for one, left in zip(carried, leaves(after), strict=True):
+        one.left = left
+    tape.block.append(made)
+    return rebuilt(state, iter([one.after for one in carried]))
 
 
 def leaves(tree: Any) -> list[Any]:

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
-#: effects that routines know
-KNOWN_EFFECTS = {"stiffening", "stops", "wear", "bushings", "controllers", "gears"}
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
 
@@ -88,8 +86,8 @@ def address(
 
 
 def has_routines(parts: Parts) -> bool:
-    """Return True when routines know all parts of a mechanism: not friction of ideal joints."""
-    return KNOWN_EFFECTS.issuperset(one.name for one in parts.present)
+    """Return True when routines know all parts of a mechanism."""
+    return True
 
 
 def call_list(
