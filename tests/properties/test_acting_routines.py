@@ -13,9 +13,9 @@ from flexclear.scene.clearance import SURFACES as JOINTS_WITH_SURFACES
 from flexclear.scene.loads import KINDS
 from flexclear.scene.registry import declared
 from flexclear.scene.schema import Scene
-from tests.properties.articulated_chains import Evaluated, evaluated, rods
-from tests.properties.mechanisms import GRAVITY, Table
-from tests.properties.test_articulated import apart
+from tests.properties.articulated_chains import Evaluated, bending, evaluated, rods, tabulated
+from tests.properties.mechanisms import GRAVITY, Table, two_loops
+from tests.properties.test_articulated import BENT, BOTH, FREE, ONE, UP_AND_DOWN, apart
 from tests.properties.test_dynamics_clearance import FRICTION, SURFACES
 from tests.properties.test_routines import ROUNDING, assert_alike, by_routines
 
@@ -166,3 +166,83 @@ def test_every_surface_law_and_load_is_tried() -> None:
     assert {"bushings", "controllers", "stops", "wear"} == {one.name for model in models for one in model.parts.present}
     kinds = {load.partition(" ")[0] for model in models for load in model.parts.loads}
     assert kinds == set(declared(KINDS)) - {"gravity"}
+
+
+# Friction of ideal joints, gears ----------------------------------------------------------------------------------------
+RUBBED = ("revolute", "prismatic", "cylindrical", "universal", "spherical")
+BEARING: Table = {"radius": 0.02, "length": 0.2, "preload": 3.0}
+
+
+def with_friction(made: Table, number: int) -> Table:
+    """A scene whose ideal joints rub by the laws in turn."""
+    for k, joint in enumerate(made["joint"].values()):
+        if joint["type"] in RUBBED:
+            law = list(FRICTION)[(number + k) % len(FRICTION)]
+            keys = ("radius", "preload") if joint["type"] == "spherical" else BEARING
+            joint["friction"] = {"law": law} | FRICTION[law] | {key: BEARING[key] for key in keys}
+            if joint["type"] == "revolute":
+                joint["friction"]["axial_radius"] = 0.03
+    return made
+
+
+def rubbing_tree(number: int) -> Table:
+    random = np.random.default_rng([number, 11])
+    kinds = tuple(str(kind) for kind in [RUBBED[number % 5], *random.choice(RUBBED, size=2), "fixed"])
+    driven = (2,) if kinds[2] in ("revolute", "prismatic") else ()
+    return with_friction(rods(4, kinds, int(random.integers(1, 3)), driven=driven), number)
+
+
+def assert_rubs_alike(found: Evaluated) -> None:
+    """And what steps read of bearings: loads, and quantities with kinks; nothing but the report where they jam."""
+    w, n = by_routines(found)
+    assert n[m.EVALUATION] == found.report
+    if found.report == m.JAMMED:
+        return
+    assert_alike(found)
+    count = found.model.arrays.size(m.SIZES["n_bearings"])
+    for table, fields in (("bends", slice(None)), ("bearing", slice(1))):
+        made, known = (
+            np.array(one[found.h[m.NAMED[table].at] :][: m.NAMED[table].size * count], dtype=float).reshape(count, -1)
+            for one in (w, found.w)
+        )
+        assert apart(made[:, fields], known[:, fields]) < 1e-9  # they end within a rounding of Newton's iteration
+
+
+@pytest.mark.parametrize("number", range(10))
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_joints_rub_as_by_kernels(number: int) -> None:
+    assert_rubs_alike(evaluated(tabulate(build(Scene.model_validate(rubbing_tree(number)), {})), turns=0.1))
+
+
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_some_of_these_joints_jam() -> None:
+    reports = {evaluated(tabulate(build(Scene.model_validate(rubbing_tree(k)), {})), turns=0.1).report for k in (0, 1)}
+    assert reports == {m.OK, m.JAMMED}
+
+
+def pressed_rods() -> Table:
+    """Flexible and rigid rods; the second one hangs in a bearing with clearance, the last one rubs, loads act on
+    frames of flexible ones."""
+    made = bending((FREE, None, ONE, BOTH), ("revolute", "clearance-revolute", "revolute", "spherical"), UP_AND_DOWN)
+    normal = {"law": "gonthier", "stiffness": 1e8, "delivered_restitution": 0.7}
+    made["joint"]["joint1"] |= SURFACES["clearance-revolute"] | {"normal": normal}
+    made["joint"]["joint1"]["friction"] = {"law": "lugre"} | FRICTION["lugre"]
+    made["joint"]["joint3"]["friction"] = {"law": "ambrosio", "radius": 0.01} | FRICTION["ambrosio"]
+    ends = {"between": ["rod0.middle", "rod2.slider"]}
+    made["load"] |= {"spring": BETWEEN[0] | ends, "mount": BETWEEN[2] | ends}
+    made["load"] |= {"push": ON_ONE[2] | {"frame": "rod2.middle"}, "turn": ON_ONE[1] | {"frame": "rod0.slider"}}
+    return made
+
+
+@pytest.mark.parametrize("name", ["friction", "friction in a loop", "pressed"])
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_forces_act_on_flexible_bodies_as_by_kernels(name: str) -> None:
+    found = evaluated(tabulated(Scene.model_validate(BENT[name] if name in BENT else pressed_rods()), True))
+    assert found.model.parts.flexible
+    assert_rubs_alike(found)
+
+
+@pytest.mark.parametrize("number", range(3))
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_joints_of_loops_rub_as_by_kernels(number: int) -> None:
+    assert_rubs_alike(evaluated(tabulate(build(Scene.model_validate(with_friction(two_loops(), number)), {}))))
