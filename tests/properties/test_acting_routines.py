@@ -8,16 +8,22 @@ import pytest
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.trajectory import integrate
 from flexclear.scene.clearance import FRICTIONS, NORMALS
 from flexclear.scene.clearance import SURFACES as JOINTS_WITH_SURFACES
+from flexclear.scene.load import load_scene
 from flexclear.scene.loads import KINDS
 from flexclear.scene.registry import declared
 from flexclear.scene.schema import Scene
+from flexclear.system.progress import silent
+from tests.analytic.mechanism_runs import TREE
 from tests.properties.articulated_chains import Evaluated, bending, evaluated, rods, tabulated
 from tests.properties.mechanisms import GRAVITY, Table, two_loops
 from tests.properties.test_articulated import BENT, BOTH, FREE, ONE, UP_AND_DOWN, apart
 from tests.properties.test_dynamics_clearance import FRICTION, SURFACES
-from tests.properties.test_routines import ROUNDING, assert_alike, by_routines
+from tests.properties.test_routines import ROUNDING, assert_alike, by_routines, long
 
 NUMBERS = range(24)
 #: by name, with keys that each demands
@@ -118,7 +124,11 @@ def table(number: int) -> Table:
         if len(single) > 1 and number % 3 == 0
         else {}
     )
-    return made | {"load": loads(random, number, made["joint"]), "stop": {"end": stop}, "drive": driven}
+    geared = (
+        {"train": {"first": single[0], "second": single[1], "ratio": 0.7}} if len(single) > 1 and not driven else {}
+    )
+    acting = {"load": loads(random, number, made["joint"]), "stop": {"end": stop}, "gear": geared, "drive": driven}
+    return made | acting
 
 
 @cache
@@ -163,12 +173,13 @@ def test_every_surface_law_and_load_is_tried() -> None:
     assert set().union(*(model.parts.surfaces for model in models)) == set(JOINTS_WITH_SURFACES)
     assert set().union(*(model.parts.frictions for model in models)) == set(declared(FRICTIONS, key="law"))
     assert {contact.joint.normal.law for model in models for contact in model.contacts} == set(NORMAL)
-    assert {"bushings", "controllers", "stops", "wear"} == {one.name for model in models for one in model.parts.present}
+    effects = {one.name for model in models for one in model.parts.present}
+    assert effects == {"bushings", "controllers", "gears", "stops", "wear"}
     kinds = {load.partition(" ")[0] for model in models for load in model.parts.loads}
     assert kinds == set(declared(KINDS)) - {"gravity"}
 
 
-# Friction of ideal joints, gears ----------------------------------------------------------------------------------------
+# Friction of ideal joints, gears --------------------------------------------------------------------------------------
 RUBBED = ("revolute", "prismatic", "cylindrical", "universal", "spherical")
 BEARING: Table = {"radius": 0.02, "length": 0.2, "preload": 3.0}
 
@@ -246,3 +257,22 @@ def test_forces_act_on_flexible_bodies_as_by_kernels(name: str) -> None:
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_joints_of_loops_rub_as_by_kernels(number: int) -> None:
     assert_rubs_alike(evaluated(tabulate(build(Scene.model_validate(with_friction(two_loops(), number)), {}))))
+
+
+# Steps ----------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", ["checks/clearance_pendulum", "checks/stops", "checks/rubbing_slider_crank"])
+def test_steps_in_contact_run_on_routines(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Events, guards and impact rates are as by kernels; steps between, where no force acts, follow rounding."""
+    scene, runs, engines = load_scene(TREE / f"scenes/{name}.toml"), [], []
+    scene = scene.model_copy(update={"time": scene.time.model_copy(update={"end": 0.1 * scene.time.end})})
+    for alone in (False, True):
+        one = long(scene)
+        with monkeypatch.context() as patch:
+            if alone:
+                patch.setattr(Engine, "has_routines", False)
+            runs.append(integrate(one, consistent_start(one), silent))
+        engines.append(one)
+    assert [one.h[m.RATES] == one.h[m.EVALUATE] for one in engines] == [False, True]
+    events = [np.array([one.events["time"], one.events["contact"], one.events["kind"]]) for one in runs]
+    assert events[0] == pytest.approx(events[1], abs=1e-9)
+    assert apart(runs[0].state, runs[1].state) < 1e-9
