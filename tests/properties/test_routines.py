@@ -77,7 +77,7 @@ def silent_text(text: str) -> None:
 def assert_alike(found: Evaluated) -> None:
     """Rates of positions, speeds and ledger; residuals, rates and pivots of the loops; the report."""
     model, h, (w, n) = found.model, found.h, by_routines(found)
-    assert has_routines(model.parts)
+    assert has_routines(model)
     rates, speeds = w[h[m.SLOPES] :][: model.ny], model.speeds
     for part in (slice(speeds.start), speeds, slice(speeds.stop, None)):
         assert apart(rates[part], found.rates[part].astype(float)) < ROUNDING

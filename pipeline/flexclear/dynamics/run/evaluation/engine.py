@@ -72,9 +72,9 @@ class Engine:
 
     @property
     def has_routines(self) -> bool:
-        """True when steps run a list of calls: of a mechanism of known routines without specialised code."""
+        """True when steps run a list of calls of routines: without specialised code."""
         alone = INTERPRETED or self.has_specialised_code or self.h[m.N_CHANGES]
-        return not alone and has_routines(self.model.parts)
+        return not alone and has_routines(self.model)
 
     @cached_property
     def breaks(self) -> np.ndarray:

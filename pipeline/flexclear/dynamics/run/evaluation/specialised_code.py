@@ -1,8 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
 It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
-steps run a list of calls of routines if these know all parts of the mechanism, else kernels; all other evaluations are
-those of kernels then. The topology alone decides, so that equal scenes give equal bytes.
+steps run a list of calls of routines, except with many bearings that rub; all other evaluations are those of kernels
+then. The topology alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
+#: bearings with friction whose loads one routine finds: its code grows with their number cubed (16: 3 s of LLVM)
+MOST_BEARINGS = 16
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
 
@@ -85,9 +87,9 @@ def address(
     return known[rows, name]
 
 
-def has_routines(parts: Parts) -> bool:
-    """Return True when routines know all parts of a mechanism."""
-    return True
+def has_routines(model: Model) -> bool:
+    """Return True when routines serve a mechanism: all but those with many bearings that rub."""
+    return model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
 
 
 def call_list(
