@@ -1,18 +1,20 @@
-"""Contacts and loads of a model: their objects, with the places of their numbers in f, w, n and the state."""
+"""Contacts, loads, gears and friction of a model: their objects, with the places of their numbers in the arrays."""
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
+from functools import cache
 from itertools import pairwise
+from math import prod
 from typing import Any
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.effects.wear.contact import LEDGER
-from flexclear.dynamics.mechanics.bearings import Bearing, BearingNumbers
-from flexclear.dynamics.mechanics.contacts import ContactNumbers, Kinds, stop, touch
-from flexclear.dynamics.mechanics.coordinates import Gauge
+from flexclear.dynamics.mechanics.contacts import stop, touch
+from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.loads import STATES, Law, act
 from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link, Rubbed, Rubbing
 from flexclear.dynamics.mechanics.trees import Site
@@ -20,45 +22,58 @@ from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.routines.calls import MODES, RATES, SCENE, STATE, WORK, Cell, cells
 
+#: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
+Gauge: Any = namedtuple("Gauge", "turning side axis sine_f sine_g cosine_f cosine_g")
+Bearing: Any = namedtuple("Bearing", "kind side axis")
+
+
+@cache
+def _record(name: str) -> Any:
+    make: Any = namedtuple
+    return make(name, m.row_fields(name))
+
+
+def _row(h: np.ndarray, name: str, k: int) -> Any:
+    """Return the numbers in a row of a table of f or w, by the names of its fields (`memory`)."""
+    table, fields = m.NAMED[name], m.row_fields(name).values()
+    row = cells({"f": SCENE, "w": WORK}[m.ARRAYS[name]], int(h[table.at]) + table.size * k, table.size)
+    return _record(name)(*(row[at : at + prod(shape)] if shape else row[at] for at, shape in fields))
+
+
+def _places(h: np.ndarray, name: str, k: int) -> list[Cell]:
+    """Return a row of a table of w."""
+    return cells(WORK, int(h[m.NAMED[name].at]) + m.NAMED[name].size * k, m.NAMED[name].size)
+
 
 def actions_of(model: Model, h: np.ndarray, ground: Carrier, frames: list[Frame]) -> list[Action]:
     """Return all contacts, stops and loads; frames: of all sites."""
     return [*_contacts(model, h, frames), *_loads(model, h, Frame(ground, Site(ZERO, UNIT)), frames)]
 
 
-def _row(h: np.ndarray, table: Any, row: int, array: str) -> list[Cell]:
-    """Return a row of a table of an array."""
-    return cells(array, int(h[table.at]) + table.size * row, table.size)
-
-
 def _contacts(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Action]:
     """Return contacts and stops, with the places of what steps read of them and of their books."""
     parts, slot, made = model.parts, model.nq + model.nv, list[Action]()
     worn = model.arrays.table(m.NAMED["worn"])["contact"].tolist()
+    wear0 = slot + model.arrays.size(m.SIZES["wear_slot"])
     for c, row in enumerate(model.arrays.table(m.CONTACTS)):
-        numbers = _row(h, m.CONTACT_NUMBERS, c, SCENE)
-        law, shape, length = (m.CONTACT_NUMBERS.friction_law, m.CONTACT_NUMBERS.shape, m.CONTACT_NUMBERS.length)
-        given = ContactNumbers(*numbers[:law], numbers[law:shape], numbers[shape:length], numbers[length])
-        state = Cell(MODES, c), Cell(WORK, int(h[m.LATCHED]) + c)
-        results = _row(h, m.TOUCH, c, WORK)
-        results += cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
-        form, between = parts.forms[row["normal"]], [frames[row["outer"]], frames[row["inner"]]]
-        if c >= model.arrays.size(m.N_SURFACES):
+        numbers, closed, latched = _row(h, "contact_numbers", c), Cell(MODES, c), Cell(WORK, int(h[m.LATCHED]) + c)
+        books = cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
+        results, form = [*_places(h, "touch", c), *books], parts.forms[row["normal"]]
+        if c < model.arrays.size(m.N_SURFACES):
+            if c in worn:
+                results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)
+            bristle, rates = (cells(array, int(row["bristle"]), 3 * (row["bristle"] >= 0)) for array in (STATE, RATES))
+            laws = form, parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
+            given = parts.surfaces[row["surfaces"]], laws, int(c in worn), numbers, closed, latched, bristle
+        else:
             gauge, turns, rates = _gauge(model, row["surfaces"])
-            made.append(Action(stop, (form, gauge, given, *state, turns), between, [*results, *rates]))
-            continue
-        if c in worn:
-            size = LEDGER.size
-            results += cells(RATES, slot + model.arrays.size(m.SIZES["wear_slot"]) + size * worn.index(c), size)
-        bent = 3 if row["bristle"] >= 0 else 0
-        friction = parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
-        kinds = Kinds(parts.surfaces[row["surfaces"]], form, friction, int(c in worn))
-        bristle, rates = (cells(array, int(row["bristle"]), bent) for array in (STATE, RATES))
-        made.append(Action(touch, (kinds, given, *state, bristle), between, [*results, *rates]))
+            given = form, gauge, numbers, closed, latched, turns
+        ends = [frames[row["outer"]], frames[row["inner"]]]
+        made.append(Action(touch if len(given) == 7 else stop, given, ends, [*results, *rates]))
     return made
 
 
-def _gauge(model: Model, k: int) -> tuple[Gauge, list[Cell], list[Cell]]:
+def _gauge(model: Model, k: int) -> tuple[Any, list[Cell], list[Cell]]:
     """Return a gauge, with the angle whose full turns it counts, and where the rate of that is stored."""
     row = model.arrays.table(m.GAUGES)[k]
     return Gauge(*(int(row[name]) for name in Gauge._fields)), *_internal(model, int(row["turns"]), 1)
@@ -76,7 +91,7 @@ class _Reading:
 
     def __init__(self, model: Model, frames: list[Frame], between: list[Frame]) -> None:
         self.model, self.sites, self.frames = model, frames, between
-        self.gauged, self.rates = list[tuple[Gauge, list[Cell], int, int]](), list[Cell]()
+        self.gauged, self.rates = list[tuple[Any, list[Cell], int, int]](), list[Cell]()
 
     def frame(self, site: int) -> int:
         """Return the number of a site's frame."""
@@ -116,18 +131,20 @@ def _loads(model: Model, h: np.ndarray, world: Frame, frames: list[Frame]) -> li
             kind,
             int(row["follows"]),
             cells(SCENE, int(h[m.LOAD_NUMBERS.at]) + number[0], number[1] - number[0]),
-            [Law(*_row(h, m.LAW, k, WORK)[:2]) for k in range(*law)],
+            [Law(*_row(h, "law", k)[:2]) for k in range(*law)],
             states,
             reading.gauged,
             read,
         )
-        bends = [cell for k in range(*bend) for cell in _row(h, m.LOAD_BENDS, k, WORK)]
+        bends = [cell for k in range(*bend) for cell in _places(h, "load_bends", k)]
         made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
     return made
 
 
-def gear(model: Model, h: np.ndarray, frames: list[Frame], k: int) -> tuple[tuple[Any, ...], list[Frame], list[Cell]]:
-    """Return what `gears.coupling` is given of a gear, the frames of both joints, and where rates of turns are stored.
+def gear(
+    model: Model, h: np.ndarray, frames: list[Frame], k: int
+) -> tuple[Any, tuple[Any, ...], list[Frame], list[Cell]]:
+    """Return the routine of a gear, what it is given, the frames of both joints, and where rates of turns are stored.
 
     The second joint comes first.
     """
@@ -135,11 +152,7 @@ def gear(model: Model, h: np.ndarray, frames: list[Frame], k: int) -> tuple[tupl
     which = [int(rows[side]) for side in ("second", "first")]
     how, turns, rates = zip(*(_gauge(model, g) for g in which), strict=True)
     joints = [frames[gauges[g][end]] for g in which for end in ("a", "b")]
-    return (
-        (how, turns, *_row(h, m.NAMED["coupling_numbers"], k, SCENE)),
-        joints,
-        [cell for one in rates for cell in one],
-    )
+    return coupling, (how, turns, _row(h, "coupling_numbers", k)), joints, [cell for one in rates for cell in one]
 
 
 def rubbing_of(model: Model, h: np.ndarray, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
@@ -149,12 +162,12 @@ def rubbing_of(model: Model, h: np.ndarray, frames: list[Frame], carriers: Seque
     for k, row in enumerate(table(m.NAMED["rubbing"])):
         bearings = []
         for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
-            one, numbers = table(m.NAMED["bearings"])[e], _row(h, m.NAMED["bearing_numbers"], e, SCENE)
-            what = Bearing(int(one["kind"]), laws[one["law"]], int(one["side"]), int(one["axis"]))
+            one = table(m.NAMED["bearings"])[e]
+            what, numbers = Bearing(*(int(one[name]) for name in Bearing._fields)), _row(h, "bearing_numbers", e)
             bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
-            bends, load = _row(h, m.NAMED["bends"], e, WORK), _row(h, m.NAMED["bearing"], e, WORK)[0]
-            given = BearingNumbers(*numbers[:5], numbers[5:])
-            bearings.append(Rubbed(what, given, bristle, [*bends[:3], *rate], load, bends[3:]))
+            bends, load = _places(h, "bends", e), _row(h, "bearing", e).load
+            given = what, laws[one["law"]], numbers, bristle
+            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:]))
         link = carriers[row["link"]] if row["link"] >= 0 else None
         if isinstance(link, Link):
             link.rubbed = True

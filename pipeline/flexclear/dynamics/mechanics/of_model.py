@@ -10,7 +10,6 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
-from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
@@ -155,8 +154,8 @@ def _closures(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Closure]
         residuals = [cell for at in (m.RESIDUAL, m.RESIDUAL_RATE) for cell in cells(WORK, int(h[at]) + row0, count)]
         factor, of_joint = (diagonal, roots, scales), (tuple(rows[row0 : row0 + count]),)
         if one["coupling"] >= 0:
-            given, joined, turning = gear(model, h, frames, int(one["coupling"]))
-            made.append(Closure(coupling, given, joined, [*residuals, *turning], *factor))
+            *how, turning = gear(model, h, frames, int(one["coupling"]))
+            made.append(Closure(*how, [*residuals, *turning], *factor))
         else:
             joined = [frames[one["site_a"]], frames[one["site_b"]]]
             made.append(Closure(closure, of_joint, joined, residuals, *factor))
