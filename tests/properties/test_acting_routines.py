@@ -1,14 +1,18 @@
 """Routines of contacts, stops and loads compute what kernels do: of random mechanisms, in contact and out of it."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.mechanics import loads as acting
+from flexclear.dynamics.mechanics import surfaces
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.scene.clearance import FRICTIONS, NORMALS
@@ -103,8 +107,8 @@ def loads(random: np.random.Generator, number: int, joints: Table) -> Table:
 def table(number: int) -> Table:
     """A tree of rods on joints, some with clearance, under loads; some joints have ends, some are driven."""
     random = np.random.default_rng([number, 9])
-    surfaces = list(SURFACES)
-    kinds = [IDEAL[random.integers(2)], *random.choice(IDEAL, size=4), *(surfaces[(number + k) % 4] for k in range(2))]
+    loose = [list(SURFACES)[(number + k) % 4] for k in range(2)]
+    kinds = [IDEAL[random.integers(2)], *random.choice(IDEAL, size=4), *loose]
     order = random.permutation(len(kinds))
     made = rods(8, tuple(str(kinds[k]) for k in order), int(random.integers(1, 4)))
     contacts = [joint for joint in made["joint"].values() if joint["type"] in SURFACES]
@@ -138,10 +142,10 @@ def pressed(number: int) -> Evaluated:
     random, off = np.random.default_rng([number, 10]), {"speeds": 0.3, "turns": 0.1, "internal": 1e-6}
     gap = evaluated(model, **off).table(m.TOUCH)["gap"].astype(float)
     depth = random.uniform(1e-6, 1e-4, size=len(gap))
-    numbers, surfaces = model.arrays.table(m.CONTACT_NUMBERS), model.arrays.size(m.N_SURFACES)
+    numbers, touching = model.arrays.table(m.CONTACT_NUMBERS), model.arrays.size(m.N_SURFACES)
     for c, (_, joint, *_) in enumerate(model.contacts):
         way = "radius" if joint.type == "ball-on-plane" else "clearance"
-        if c < surfaces:
+        if c < touching:
             numbers[way][c] += (gap + depth)[c] * (1.0 if way == "radius" else -1.0)
         else:
             numbers["shape"][c, 0] -= numbers["shape"][c, 1] * (gap + depth)[c]
@@ -177,6 +181,14 @@ def test_every_surface_law_and_load_is_tried() -> None:
     assert effects == {"bushings", "controllers", "gears", "stops", "wear"}
     kinds = {load.partition(" ")[0] for model in models for load in model.parts.loads}
     assert kinds == set(declared(KINDS)) - {"gravity"}
+
+
+@pytest.mark.parametrize("table", [surfaces.SURFACES, acting.LOADS], ids=["surfaces", "loads"])
+def test_kernels_serve_parts_that_routines_lack(table: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    model = pressed(1).model
+    assert has_routines(model)
+    monkeypatch.delitem(table, next(name for name in table if name in (*model.parts.surfaces, *model.parts.loads)))
+    assert not has_routines(model)
 
 
 # Friction of ideal joints, gears --------------------------------------------------------------------------------------

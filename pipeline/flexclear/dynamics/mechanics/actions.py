@@ -59,6 +59,7 @@ def _contacts(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Action]:
         numbers, closed, latched = _row(h, "contact_numbers", c), Cell(MODES, c), Cell(WORK, int(h[m.LATCHED]) + c)
         books = cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
         results, form = [*_places(h, "touch", c), *books], parts.forms[row["normal"]]
+        given: tuple[Any, ...]
         if c < model.arrays.size(m.N_SURFACES):
             if c in worn:
                 results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)

@@ -64,7 +64,7 @@ def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, 
         unit = Wrench(numbers.radius * (F.R_WB @ force), ZERO)
     else:
         unit = Wrench((numbers.radius * force[1]) * n, force[0] * n)
-    return (slip, rate if bristle else ()), on_both(a, b, G, unit), unit, -dot(force, slip), R
+    return (slip, rate if bristle else ()), on_both((a, b), G, unit), unit, -dot(force, slip), R
 
 
 @routine

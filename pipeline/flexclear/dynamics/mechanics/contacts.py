@@ -77,7 +77,7 @@ def touch(
     apart = (0.0,) * 6, ZERO, ZERO, (0.0,) * 5, ZERO
     read, F, Q, books, rate = branch(closed == 1, forces, lambda: apart)
     stored = gap, approach, read, F, A.R_WB.T @ offset, Q, books[: 5 if worn else 3], rate if bristle else ()
-    return stored, on_both(*ends, B, Wrench(cross(Q - B.p_WB, F), F)), ()
+    return stored, on_both(ends, B, Wrench(cross(Q - B.p_WB, F), F)), ()
 
 
 @routine
@@ -92,4 +92,4 @@ def stop(form: str, gauge: Any, numbers: Any, closed: Any, latched: Any, turns: 
     wrench = unit * (-sense * N)
     force = wrench.moment if gauge.turning else wrench.force
     read = gap, approach, (N, 0.0, taken, stored, 0.0, 0.0), force, (numbers.clearance - gap, 0.0, 0.0), ZERO
-    return (read, (taken, 0.0, N), [rate for _ in turns]), on_both(*ends, G, wrench), ()
+    return (read, (taken, 0.0, N), [rate for _ in turns]), on_both(ends, G, wrench), ()

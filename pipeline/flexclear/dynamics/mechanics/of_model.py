@@ -43,7 +43,9 @@ def mechanism_of(model: Model, h: np.ndarray) -> Mechanism:
     actions = actions_of(model, h, ground, frames)
     gravity, least = _numbers(h, m.GRAVITY, 0), Cell(WORK, int(h[m.PIVOT]) + m.LAST_PIVOT)
     closures, rubbing = _closures(model, h, frames), rubbing_of(model, h, frames, carriers)
-    stored = {cell.key for one in (*actions, *closures) for cell in one.results}
+    stored = {cell.key for one in actions for cell in one.results} | {
+        cell.key for one in closures for cell in one.results
+    }
     stored |= {cell.key for joint in rubbing for one in joint.bearings for cell in one.sliding}
     books = enumerate(cells(RATES, model.nq + model.nv, model.arrays.size(m.N_LEDGER)))
     ledger = {book: cell for book, cell in books if cell.key not in stored}
@@ -154,8 +156,8 @@ def _closures(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Closure]
         residuals = [cell for at in (m.RESIDUAL, m.RESIDUAL_RATE) for cell in cells(WORK, int(h[at]) + row0, count)]
         factor, of_joint = (diagonal, roots, scales), (tuple(rows[row0 : row0 + count]),)
         if one["coupling"] >= 0:
-            *how, turning = gear(model, h, frames, int(one["coupling"]))
-            made.append(Closure(*how, [*residuals, *turning], *factor))
+            which, given, joined, turning = gear(model, h, frames, int(one["coupling"]))
+            made.append(Closure(which, given, joined, [*residuals, *turning], *factor))
         else:
             joined = [frames[one["site_a"]], frames[one["site_b"]]]
             made.append(Closure(closure, of_joint, joined, residuals, *factor))

@@ -1,8 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
 It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
-steps run a list of calls of routines, except with many bearings that rub; all other evaluations are those of kernels
-then. The topology alone decides, so that equal scenes give equal bytes.
+steps run a list of calls of routines if these know all parts of the mechanism, else kernels; all other evaluations are
+those of kernels then. The topology alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
+#: effects that routines know
+KNOWN_EFFECTS = ("stiffening", "stops", "gears", "bushings", "controllers", "joint_friction", "wear")
 #: bearings with friction whose loads one routine finds: its code grows with their number cubed (16: 3 s of LLVM)
 MOST_BEARINGS = 16
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
@@ -88,15 +90,24 @@ def address(
 
 
 def has_routines(model: Model) -> bool:
-    """Return True when routines serve a mechanism: all but those with many bearings that rub."""
-    return model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
+    """Return True when routines know all parts of a mechanism, and few enough bearings rub."""
+    from flexclear.dynamics.mechanics.joints import JOINTS  # here: they import the compiler
+    from flexclear.dynamics.mechanics.loads import LOADS
+    from flexclear.dynamics.mechanics.surfaces import SURFACES
+
+    parts = model.parts
+    loads = (kind.partition(" ")[0] for kind in parts.loads)
+    effects = (one.name for one in parts.present)
+    named = (JOINTS, parts.joints), (SURFACES, parts.surfaces), (LOADS, loads), (KNOWN_EFFECTS, effects)
+    known = all(set(table).issuperset(names) for table, names in named)
+    return known and model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
 
 
 def call_list(
     model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
 ) -> ListInstance:
     """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
-    from flexclear.dynamics.mechanics.mechanism import evaluation  # here: they import the compiler
+    from flexclear.dynamics.mechanics.mechanism import evaluation
     from flexclear.dynamics.mechanics.of_model import mechanism_of
     from flexclear.dynamics.routines.store import stored
 
