@@ -6,7 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flexclear.dynamics import loads as kinds_of_loads
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact import surfaces as kinds_of_surfaces
+from flexclear.dynamics.contact.friction import FRICTION_LAWS
+from flexclear.dynamics.contact.normal import NORMAL_LAWS
 from flexclear.dynamics.mechanics import loads as acting
 from flexclear.dynamics.mechanics import surfaces
 from flexclear.dynamics.model.mechanism import build
@@ -15,11 +19,7 @@ from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.trajectory import integrate
-from flexclear.scene.clearance import FRICTIONS, NORMALS
-from flexclear.scene.clearance import SURFACES as JOINTS_WITH_SURFACES
 from flexclear.scene.load import load_scene
-from flexclear.scene.loads import KINDS
-from flexclear.scene.registry import declared
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
@@ -31,9 +31,7 @@ from tests.properties.test_routines import ROUNDING, assert_alike, by_routines, 
 
 NUMBERS = range(24)
 #: by name, with keys that each demands
-NORMAL: dict[str, Table] = {
-    name: {"delivered_restitution": 0.7} for name in declared(NORMALS, key="law") if name != "hertz"
-}
+NORMAL: dict[str, Table] = {name: {"delivered_restitution": 0.7} for name in NORMAL_LAWS if name != "hertz"}
 NORMAL |= {
     "hertz": {},
     "kelvin-voigt": {"damping": 100.0, "stiffness": 1e7},
@@ -174,13 +172,13 @@ def test_random_mechanisms_in_contact_move_as_by_kernels(number: int) -> None:
 
 def test_every_surface_law_and_load_is_tried() -> None:
     models = [pressed(number).model for number in NUMBERS]
-    assert set().union(*(model.parts.surfaces for model in models)) == set(JOINTS_WITH_SURFACES)
-    assert set().union(*(model.parts.frictions for model in models)) == set(declared(FRICTIONS, key="law"))
+    assert set().union(*(model.parts.surfaces for model in models)) == set(kinds_of_surfaces.SURFACES)
+    assert set().union(*(model.parts.frictions for model in models)) == set(FRICTION_LAWS)
     assert {contact.joint.normal.law for model in models for contact in model.contacts} == set(NORMAL)
     effects = {one.name for model in models for one in model.parts.present}
     assert effects == {"bushings", "controllers", "gears", "stops", "wear"}
     kinds = {load.partition(" ")[0] for model in models for load in model.parts.loads}
-    assert kinds == set(declared(KINDS)) - {"gravity"}
+    assert kinds == set(kinds_of_loads.LOADS)
 
 
 @pytest.mark.parametrize("table", [surfaces.SURFACES, acting.LOADS], ids=["surfaces", "loads"])

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.wear.contact import LEDGER
+from flexclear.dynamics.contact.wear import LEDGER
 from flexclear.dynamics.mechanics.contacts import stop, touch
 from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.loads import STATES, Law, act

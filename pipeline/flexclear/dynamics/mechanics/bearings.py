@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import Any, NamedTuple
 
-from flexclear.dynamics.effects.joint_friction.bearings import BALL, PIN, SLIDER
+from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
 from flexclear.dynamics.mechanics.contacts import rub
 from flexclear.dynamics.mechanics.surfaces import across
 from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, carried, on_both
