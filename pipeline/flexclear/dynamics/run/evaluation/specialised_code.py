@@ -107,7 +107,7 @@ def call_list(
     model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
 ) -> ListInstance:
     """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
-    from flexclear.dynamics.mechanics.mechanism import evaluation
+    from flexclear.dynamics.mechanics.evaluation import evaluation
     from flexclear.dynamics.mechanics.of_model import mechanism_of
     from flexclear.dynamics.routines.store import stored
 
