@@ -14,7 +14,7 @@ from benchmarks.families.growth import four_bars, hinged
 from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
-from flexclear.dynamics.mechanics import closures, trees
+from flexclear.dynamics.mechanics import closures, flexible, trees
 from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
 from flexclear.dynamics.mechanics.mechanism import evaluation, status
 from flexclear.dynamics.mechanics.of_model import mechanism_of
@@ -38,10 +38,22 @@ from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import movable
-from tests.properties.articulated_chains import Evaluated, evaluated, rods, tabulated
+from tests.properties.articulated_chains import Evaluated, bending, evaluated, rods, tabulated
 from tests.properties.mechanisms import two_loops
 from tests.properties.movable_units import UNITS
-from tests.properties.test_articulated import BENT, MIXED, TREES, apart, massless
+from tests.properties.test_articulated import (
+    BENT,
+    BOTH,
+    FIXED,
+    FREE,
+    MANY,
+    MIXED,
+    NONE,
+    ONE,
+    TREES,
+    apart,
+    massless,
+)
 
 #: of the largest rate of a kind; measured 5e-12 at worst: kernels refer wrenches to a distant origin
 ROUNDING = 1e-10
@@ -147,6 +159,30 @@ def test_random_mechanisms_move_as_by_kernels(number: int) -> None:
         assert_alike(evaluated(model))
 
 
+def bent(number: int) -> Model:
+    """Random rigid and flexible rods in a chain or a tree, often in a loop, some of them driven, or stiffened."""
+    random = np.random.default_rng([number, 9])
+    stiffening, count = bool(random.random() < 0.4), int(random.integers(2, 6))
+    modes = (BOTH, ONE, NONE, FREE, FIXED, None, *(() if stiffening else (MANY,)))
+    references = (FREE, *(modes[k] for k in random.integers(len(modes), size=count - 1)))
+    turned = bool(random.random() < 0.7)  # against each other, so that joints must turn about z
+    free = ("revolute", "spherical", "cylindrical", "planar") if turned else (*MIXED, "fixed", "free")
+    kinds = tuple(random.choice(free, size=3).tolist())
+    children = int(random.integers(1, 3))
+    last = count if children == 1 else 2  # rods that turn against the one before them
+    driven = tuple(k for k in range(last) if kinds[k % 3] == "revolute" and random.random() < 0.4)
+    given = {"children": children, "closed": str(random.choice(["", "spherical", "revolute"]))}
+    angles = tuple((turned * random.uniform(-1.2, 1.2, size=3)).tolist())
+    scene = bending(references, kinds, angles, **given, driven=driven, stiffening=stiffening)
+    return tabulated(Scene.model_validate(scene), True)
+
+
+@pytest.mark.parametrize("number", range(20))
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_random_flexible_mechanisms_move_as_by_kernels(number: int) -> None:
+    assert_alike(evaluated(bent(number)))
+
+
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_rounding_does_not_grow_with_the_distance_from_the_origin() -> None:
     """A thousand sizes away, against the same equations in extended precision; kernels leave 2e-10."""
@@ -232,6 +268,17 @@ def test_a_coordinate_moves_mass_or_rounding(mass: float, sound: float) -> None:
     body = trees.Body(mass, ZERO, Symmetric([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     step = trees.Step([trees.Twist(ZERO, Vector([0.0, 0.0, 1.0]))], ZERO)
     assert trees.eliminate(0, still, body, trees.Bounds(1.0, 1.0), step, [], 1.0)[-1] == sound
+
+
+@pytest.mark.parametrize("mass, sound", [(2e-14, 1.0), (5e-15, 0.0), (np.nan, 0.0)])
+def test_a_shape_moves_mass_or_rounding(mass: float, sound: float) -> None:
+    """As share of its own, once another shape of the same motion is eliminated; on floats."""
+    none = [Wrench(ZERO, ZERO)] * 2
+    body = flexible.Need(
+        Inertia(*inertia_parts(np.random.default_rng(6))), none[0], none, [[1.0], [1.0, 1.0 + mass]], [0.0] * 2
+    )
+    with np.errstate(invalid="ignore"):
+        assert flexible.eliminate(body, [], np.float64(1.0))[-1] == sound
 
 
 @pytest.mark.parametrize(

@@ -290,7 +290,7 @@ class Spread(NamedTuple):
 
 
 def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
-    """Return V = L^-1 J^T of the rows of a closure, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
+    """Return V = L^-1 J^T of a closure's rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
     found, waiting, loads = Spread({}, {}), dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
     S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
 

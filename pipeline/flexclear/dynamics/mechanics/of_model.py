@@ -21,7 +21,7 @@ def mechanism_of(model: Model, h: np.ndarray) -> Mechanism:
     carriers, frames, sites = (
         [ground],
         list[Frame](),
-        [*zip(*(table(m.SITES, h)[name].tolist() for name in ("link", "port")))],
+        table(m.SITES, h).tolist(),
     )
     flexible, links = dict(zip(table(m.FLEXES, h)["link"].tolist(), table(m.FLEXES, h), strict=True)), list[Link]()
 
