@@ -113,6 +113,12 @@ def with_multipliers(forces: Numbers, V: Rows, multipliers: Numbers) -> list[Any
 
 
 @routine
+def opposite(right: Numbers) -> list[Any]:
+    """Return -right."""
+    return [-one for one in right]
+
+
+@routine
 def cholesky(S: Rows, diagonal: Numbers, scales: Numbers, least: Any) -> tuple[list[Any], Rows, Any]:
     """Return diagonal and reciprocal diagonal of the factor of a diagonal block; the factor; and its least pivot.
 

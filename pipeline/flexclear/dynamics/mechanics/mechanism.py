@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.mechanics import bearings as b
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
@@ -115,7 +116,7 @@ class Link(Carrier):
     """A body with the joint that carries it. Its numbers are in memory.
 
     frame: of the joint, on the parent.  body: of a rigid body.  modes: of a flexible one.  rates: where those of its
-    positions and speeds are stored.  book: of the ledger, for its drives.  The others follow as `trees` has them;
+    positions and speeds are stored.  book: of the ledger, for its drives.  rubbed: True when bearings of its joint rub.  The others follow as `trees` has them;
     closing: wrenches of the closures on it and all beyond, by rows, and the multipliers.
     """
 
@@ -127,6 +128,7 @@ class Link(Carrier):
     rates: Cells = ()
     book: int = -1
     modes: Modes | None = None
+    rubbed: bool = False
     step: Step = field(init=False)
     rest: Resistance = field(init=False)
     gains: t.Gains = field(init=False, default=())
@@ -148,40 +150,83 @@ class Link(Carrier):
 
 
 class Closure(NamedTuple):
-    """A joint that closes a loop, between frames a and b.
+    """A joint that closes a loop, or a gear. frames: on whose bodies its rows act.
 
-    rows: see `closures.row`; those solved for come first.  residuals: where those of all rows and their rates are
-    stored.  diagonal, roots: of the rows solved for, where the diagonal of J M^-1 J^T and of its inverse factor are
-    stored.  scales: reference of each pivot.
+    routine: takes what is given, the number of rows solved for, and the frames' ends, and returns what is stored in
+    `results`, then gamma of those rows and their wrenches on each body; see `closures.closure`.  diagonal, roots: of
+    the rows solved for, where the diagonal of J M^-1 J^T and of its inverse factor are stored.  scales: reference of
+    each pivot.
     """
 
-    a: Frame
-    b: Frame
-    rows: tuple[tuple[int, int, int], ...]
-    residuals: Cells
+    routine: Callable
+    given: tuple[Any, ...]
+    frames: Sequence[Frame]
+    results: Cells
     diagonal: Cells
     roots: Cells
     scales: Cells
 
 
-class Mechanism(NamedTuple):
-    """A mechanism. links: parents first, without the ground.  ledger: where its rates are stored.
+class Action(NamedTuple):
+    """A contact or a load. frames: those between which it acts, and others that it reads.
 
-    least_pivot: where the smallest pivot of the closures is stored.
+    routine: takes what is given and the frames' ends, and returns what is stored in `results`, the wrenches on the
+    bodies of the first two frames, and powers.  book: of the ledger, for the first of these.
+    """
+
+    routine: Callable
+    given: tuple[Any, ...]
+    frames: Sequence[Frame]
+    results: Cells
+    book: int = -1
+
+
+class Rubbed(NamedTuple):
+    """A bearing with friction. bristle: its state.  sliding, load, bends: where its sliding velocity with the bristle's
+    rate, its load, and the parts of that with kinks are stored."""
+
+    bearing: b.Bearing
+    numbers: b.BearingNumbers
+    bristle: Cells
+    sliding: Cells
+    load: Cell
+    bends: Cells
+
+
+class Rubbing(NamedTuple):
+    """Friction of an ideal joint. frames: of the joint.  link: that it carries, or None.  second: 1 when that is on the
+    side of the second frame, else -1.  closure: of a joint that closes a loop, or -1.  book: of the ledger."""
+
+    frames: tuple[Frame, Frame]
+    link: Link | None
+    second: int
+    closure: int
+    bearings: Sequence[Rubbed]
+    book: int
+
+
+class Mechanism(NamedTuple):
+    """A mechanism. links: parents first, without the ground.  least_pivot: where the closures' smallest is stored.
+
+    ledger: where the rates are stored of those books that no action stores itself.
     """
 
     ground: Carrier
     links: Sequence[Link]
     closures: Sequence[Closure]
+    actions: Sequence[Action]
+    rubbing: Sequence[Rubbing]
     gravity: Cells
-    ledger: Cells
+    ledger: Mapping[int, Cell]
     least_pivot: Cell
 
 
 @routine
-def status(sound: Any, least: Any) -> tuple[Any]:
-    """Return the report of an evaluation (`memory`), from those of `trees.eliminate` and `closures.independence`."""
-    regular = select(least > c.SINGULAR, float(m.OK), float(m.SINGULAR))
+def status(sound: Any, least: Any, jammed: Any) -> tuple[Any]:
+    """Return the report of an evaluation (`memory`), from those of `trees.eliminate`, `closures.cholesky` and
+    `bearings.loads_of`."""
+    free = select(jammed > 0.5, float(m.JAMMED), float(m.OK))
+    regular = select(least > c.SINGULAR, free, float(m.SINGULAR))
     return (select(sound > 0.5, regular, float(m.NOT_POSITIVE)),)
 
 
@@ -189,19 +234,15 @@ def evaluation(mechanism: Mechanism) -> CallList:
     """Return the calls that store the rates of the state, and what steps read besides (`specialise.program.KEPT`)."""
     with CallList().building() as calls:
         placed(mechanism)
+        supplied = acted(mechanism, calls)
         sound = eliminated(mechanism)
-        least = closed(mechanism, calls) if mechanism.closures else 1.0
-        for link in mechanism.links:
-            if link.driven:
-                link.acceleration = t.follow(link.frame.acceleration, link.step)
-            else:
-                given = link.frame.acceleration, link.step, link.gains, link.forces
-                link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
-            if modes := link.modes:
-                given = modes.basis, modes.body.T, modes.u, modes.gains, modes.forces, link.acceleration
-                modes.accelerations = calls.store(modes.rates, f.accelerate, *given)
-        calls.write(mechanism.ledger, powers(mechanism))
-        calls.store([Cell(RESULTS, 0)], status, sound, least)
+        loops, jammed = closed(mechanism, calls), 0.0
+        if mechanism.rubbing:
+            lost, jammed = rubbed(mechanism, loops, calls)
+            supplied += lost
+        accelerated(mechanism, calls)
+        calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_links(mechanism)]))
+        calls.store([Cell(RESULTS, 0)], status, sound, loops.least, jammed)
     return calls
 
 
@@ -215,6 +256,24 @@ def placed(mechanism: Mechanism) -> None:
             link.motion, link.step, modes.twists = f.body_of(*given)
 
 
+def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
+    """Apply contacts and loads to all bodies; return powers by their books."""
+    powers, rigidly = list[tuple[int, Any]](), dict[Link, Wrench]()
+    for one in mechanism.actions:
+        ends = [frame.placed for frame in one.frames]
+        wrenches, supplied = calls.store(one.results, one.routine, *one.given, *ends)
+        for frame, wrench in zip(one.frames, wrenches, strict=False):
+            link = frame.carrier
+            if frame.deformed[1]:
+                frame.push(wrench)
+            elif isinstance(link, Link):
+                rigidly[link] = t.added(rigidly[link], wrench) if link in rigidly else wrench
+        powers += [(one.book + k, power) for k, power in enumerate(supplied) if power != 0.0]
+    for link, wrench in rigidly.items():
+        link.beyond.append((t.pushed(wrench), ()))
+    return powers
+
+
 def eliminated(mechanism: Mechanism) -> Any:
     """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass."""
     sound: Any = 1.0
@@ -226,11 +285,11 @@ def eliminated(mechanism: Mechanism) -> Any:
                 more = f.bend(more, station, modes.q)
             need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
             modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
-        elif link.driven:
+        elif link.driven or link.rubbed:
             link.rest = t.resist(link.motion, link.body, link.beyond)
         if link.driven:
             rest = t.carry(link.step, link.rest) if link.on_link else None
-        elif link.modes:
+        elif link.modes or link.rubbed:
             rest, link.gains, link.forces, sound = t.free_joint(carried_on, link.rest, link.bounds, link.step, sound)
         else:
             given = carried_on, link.motion, link.body, link.bounds, link.step, link.beyond, sound
@@ -240,16 +299,39 @@ def eliminated(mechanism: Mechanism) -> Any:
     return sound
 
 
-def closed(mechanism: Mechanism, calls: CallList) -> Any:
-    """Add the closures' forces to those of all links; return the smallest pivot of their matrix."""
+class Spread(NamedTuple):
+    """Rows passed from their ends to the ground: V by what they move, and wrenches through joints that are watched."""
+
+    V: dict[Link | Modes, c.Rows]
+    through: dict[Link, c.Wrenches]
+
+
+class Loops(NamedTuple):
+    """Closures that are solved for: their rows passed to the ground, with their wrenches on the second body, and their
+    multipliers; the factor of their matrix, and its smallest pivot."""
+
+    found: dict[int, Spread]
+    on_second: dict[int, c.Wrenches]
+    multipliers: dict[int, t.Numbers]
+    L: c.Blocks
+    least: Any
+
+    def solved(self, right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
+        """Return the multipliers for right-hand sides."""
+        return dict(zip(self.found, c.solved(self.L, right), strict=True))
+
+
+def closed(mechanism: Mechanism, calls: CallList) -> Loops:
+    """Add the closures' forces to those of all links."""
     found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
-    for one in mechanism.closures:
-        kept, frames = len(one.scales), (one.a, one.b)
-        gamma, *wrenches = calls.store(one.residuals, c.closure, one.rows, kept, *(frame.placed for frame in frames))
+    numbers, on_second = list[int](), dict[int, c.Wrenches]()
+    for number, one in enumerate(mechanism.closures):
+        kept, ends = len(one.scales), (frame.placed for frame in one.frames)
+        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *ends)
         if not kept:
             continue
         i = len(found)
-        mine, gamma, S[i, i] = passed_inwards(list(zip(frames, wrenches, strict=True)), gamma)
+        mine, gamma, S[i, i] = passed_inwards(list(zip(one.frames, wrenches, strict=True)), gamma)
         for moved, V in mine.V.items():
             for k in moved_by.setdefault(moved, []):
                 before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
@@ -257,14 +339,137 @@ def closed(mechanism: Mechanism, calls: CallList) -> Any:
             moved_by[moved].append(i)
         found.append(mine)
         right.append(gamma)
+        numbers.append(number)
+        on_second[number] = wrenches[1]
+    if not mechanism.closures:
+        return Loops({}, {}, {}, {}, 1.0)
     L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
-    for mine, multipliers in zip(found, c.solved(L, right), strict=True):
-        for moved, V in mine.V.items():
-            moved.forces = c.with_multipliers(moved.forces, V, multipliers)
-        for link, on_it in mine.driven.items():
-            link.closing.append((on_it, multipliers))
     calls.write([mechanism.least_pivot], [least])
-    return least
+    multipliers = dict(zip(numbers, c.solved(L, right), strict=True))
+    loops = Loops(dict(zip(numbers, found, strict=True)), on_second, multipliers, L, least)
+    for number, mine in loops.found.items():
+        for moved, V in mine.V.items():
+            moved.forces = c.with_multipliers(moved.forces, V, multipliers[number])
+        for link, on_it in mine.through.items():
+            link.closing.append((on_it, multipliers[number]))
+    return loops
+
+
+def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
+    """Compute the accelerations of all links from their forces; store the rates of the state, if there are calls."""
+    for link in mechanism.links:
+        if link.driven:
+            link.acceleration = t.follow(link.frame.acceleration, link.step)
+        else:
+            given = link.frame.acceleration, link.step, link.gains, link.forces
+            if calls:
+                link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
+            else:
+                _, link.acceleration = t.accelerate("fixed", Coordinates((), (), ()), *given)
+        if modes := link.modes:
+            given = modes.gains, modes.forces, link.acceleration
+            if calls:
+                given = modes.basis, modes.body.T, modes.u, *given
+                modes.accelerations = calls.store(modes.rates, f.accelerate, *given)
+            else:
+                _, modes.accelerations = f.accelerate((), (), (), *given)
+
+
+# Friction of ideal joints ---------------------------------------------------------------------------------------------
+class Influence(NamedTuple):
+    """What a bearing does per normal force: L^-1 of its forces by what they move; wrenches on links that are watched,
+    and the multipliers of closures; its wrench on the second body at the joint's frame."""
+
+    forces: dict[Link | Modes, t.Numbers]
+    through: dict[Link, Wrench]
+    multipliers: dict[int, t.Numbers]
+    unit: Wrench
+
+
+def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tuple[int, Any]], Any]:
+    """Add friction of joints to the forces of all links, and to those on drives; return lost powers by their books, and
+    1 where friction jams the mechanism."""
+    influences, losses, bearings = list[tuple[Rubbing, Influence]](), dict[int, list[Any]](), list[Any]()
+    for joint in mechanism.rubbing:
+        ends, wrenches, units = [frame.placed for frame in joint.frames], list[Any](), list[Wrench]()
+        for one in joint.bearings:
+            given = one.bearing, one.numbers, one.bristle, *ends
+            on_both, unit, loss, R_WB = calls.store(one.sliding, b.friction_of, *given)
+            wrenches.append(on_both)
+            units.append(unit)
+            losses.setdefault(joint.book, []).append(loss)
+            bearings.append((one.bearing, one.numbers, R_WB))
+        spread, *_ = passed_inwards(
+            list(zip(joint.frames, zip(*wrenches, strict=True), strict=True)), [0.0] * len(units)
+        )
+        influences += [(joint, influence(loops, spread, k, unit)) for k, unit in enumerate(units)]
+
+    without = {moved: moved.forces for link in mechanism.links for moved in (link, link.modes) if moved}
+    accelerated(mechanism)
+    smooth = [reaction(mechanism, loops, joint) for joint in mechanism.rubbing]
+    parts = []
+    for of_joint, one in influences:
+        for moved, forces in without.items():
+            moved.forces = one.forces.get(moved, [0.0] * len(forces))
+        accelerated(mechanism)
+        parts.append([reaction(mechanism, loops, joint, one, joint is of_joint) for joint in mechanism.rubbing])
+    of_bearing = [k for k, joint in enumerate(mechanism.rubbing) for _ in joint.bearings]
+    cells = [one for joint in mechanism.rubbing for one in joint.bearings]
+    loads = [one.load for one in cells]
+    given = bearings, [smooth[k] for k in of_bearing], [[part[k] for part in parts] for k in of_bearing]
+    jammed = calls.store([*loads, *(cell for one in cells for cell in one.bends)], b.loads_of, *given)
+
+    for moved, forces in without.items():
+        V = [one.forces.get(moved, [0.0] * len(forces)) for _, one in influences]
+        moved.forces = c.with_multipliers(forces, list(zip(*V, strict=True)), loads)
+    for number, before in loops.multipliers.items():
+        rows = list(zip(*(one.multipliers[number] for _, one in influences), strict=True))
+        more = c.with_multipliers([0.0] * len(before), rows, loads)
+        for link, on_it in loops.found[number].through.items():
+            link.closing.append((on_it, more))
+    for (_, one), load in zip(influences, loads, strict=True):
+        for link, wrench in one.through.items():
+            link.closing.append(([wrench], [load]))
+    begins = dict[int, Any]()
+    at = iter(loads)
+    for joint in mechanism.rubbing:
+        begins[joint.book] = b.lost([next(at) for _ in joint.bearings], losses[joint.book])
+    return list(begins.items()), jammed
+
+
+def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
+    """Return what bearing k of a joint does per normal force, while all loops stay closed."""
+    forces = {moved: [row[k] for row in V] for moved, V in spread.V.items()}
+    right = list[Any]()
+    for number, one in loops.found.items():
+        rows: c.Rows = [[0.0]] * len(loops.multipliers[number])
+        for moved, V in one.V.items():
+            if moved in forces:
+                rows = c.coupled(rows, V, [[force] for force in forces[moved]])
+        right.append(c.opposite([row[0] for row in rows]))
+    multipliers = loops.solved(right)
+    for number, one in loops.found.items():
+        for moved, V in one.V.items():
+            forces[moved] = c.with_multipliers(forces.get(moved, [0.0] * len(V)), V, multipliers[number])
+    return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
+
+
+def reaction(
+    mechanism: Mechanism, loops: Loops, joint: Rubbing, by: Influence | None = None, own: bool = False
+) -> Wrench:
+    """Return the wrench of a joint on its second body at present accelerations: without friction, or `by` that of a
+    bearing alone; own: True for one of the joint itself."""
+    second = joint.frames[1].placed
+    multipliers = by.multipliers if by else loops.multipliers
+    if joint.link is None:
+        given = loops.on_second.get(joint.closure, []), multipliers.get(joint.closure, [])
+        return b.reaction_in_loop(*given, [by.unit] if by and own else [], second)
+    link = joint.link
+    passing = [(one.through[link], multipliers[number]) for number, one in loops.found.items() if link in one.through]
+    if by and not own and link in by.through:
+        passing.append(([by.through[link]], [1.0]))
+    given = joint.second, link.rest, link.acceleration, int(by is None), passing, link.motion, second
+    return b.reaction_in_tree(*given)
 
 
 def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tuple[c.Blocks, Any]:
@@ -280,13 +485,6 @@ def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tup
                 before = rest.get((i, k)) or [[0.0] * len(L[k, j])] * len(L[i, j])
                 rest[i, k] = c.eliminated(before, L[i, j], L[k, j])
     return L, least
-
-
-class Spread(NamedTuple):
-    """Rows of a closure passed from its ends to the ground: V by what it moves, and wrenches on links with drives."""
-
-    V: dict[Link | Modes, c.Rows]
-    driven: dict[Link, c.Wrenches]
 
 
 def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
@@ -308,8 +506,8 @@ def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -
         if modes := link.modes:
             given = modes.gains, modes.forces, loads[link], wrenches, gamma, S
             found.V[modes], gamma, S, wrenches = f.spread(*given)
-        if link.driven:
-            found.driven[link] = wrenches
+        if link.driven or link.rubbed:
+            found.through[link] = wrenches
         if link.gains:
             given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
             found.V[link], gamma, S, passed = c.spread(*given)
@@ -319,16 +517,21 @@ def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -
     return found, gamma, S
 
 
-def powers(mechanism: Mechanism) -> list[Any]:
-    """Return the rates of the ledger: powers of drives, and lost to damping of modes, in their books, else zeros."""
-    sums: list[Any] = [0.0] * len(mechanism.ledger)
+def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
+    """Return the powers of drives, and those lost to damping of modes, by their books."""
+    powers = list[tuple[int, Any]]()
     for link in mechanism.links:
-        entries = []
         if link.driven:
             given = link.step, link.rest, link.acceleration, link.closing, link.coordinates.u
-            entries.append((link.book, t.driving_power(*given)))
+            powers.append((link.book, t.driving_power(*given)))
         if modes := link.modes:
-            entries.append((modes.book, f.damping_power(modes.body.damping, modes.u)))
-        for book, power in entries:
-            (sums[book],) = c.together([sums[book]], [power])
-    return sums
+            powers.append((modes.book, f.damping_power(modes.body.damping, modes.u)))
+    return powers
+
+
+def booked(mechanism: Mechanism, powers: Iterable[tuple[int, Any]]) -> list[Any]:
+    """Return the rates of the ledger's books: sums of powers."""
+    sums: dict[int, Any] = dict.fromkeys(mechanism.ledger, 0.0)
+    for book, power in powers:
+        sums[book] = t.added(sums[book], power) if sums[book] else power
+    return list(sums.values())

@@ -7,7 +7,10 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
+from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
+from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
@@ -38,9 +41,14 @@ def mechanism_of(model: Model, h: np.ndarray) -> Mechanism:
         carriers.append(links[-1])
     for k in range(len(links), len(sites)):
         place(k)
-    ledger = cells(RATES, model.nq + model.nv, model.arrays.size(m.N_LEDGER))
+    actions = actions_of(model, h, ground, frames)
     gravity, least = _numbers(h, m.GRAVITY, 0), Cell(WORK, int(h[m.PIVOT]) + m.LAST_PIVOT)
-    return Mechanism(ground, links, _closures(model, h, frames), gravity, ledger, least)
+    closures, rubbing = _closures(model, h, frames), rubbing_of(model, h, frames, carriers)
+    stored = {cell.key for one in (*actions, *closures) for cell in one.results}
+    stored |= {cell.key for joint in rubbing for one in joint.bearings for cell in one.sliding}
+    books = enumerate(cells(RATES, model.nq + model.nv, model.arrays.size(m.N_LEDGER)))
+    ledger = {book: cell for book, cell in books if cell.key not in stored}
+    return Mechanism(ground, links, closures, actions, rubbing, gravity, ledger, least)
 
 
 def _numbers(h: np.ndarray, table: Any, row: int, count: int = 1) -> list[Cell]:
@@ -145,6 +153,11 @@ def _closures(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Closure]
         diagonal = cells(WORK, scales[0].index + model.arrays.size(m.N_CLOSURE_ROWS), kept) if kept else []
         roots = [Cell(WORK, int(h[m.SCHUR] + origins[r]) + r) for r in range(kept0, kept0 + kept)]
         residuals = [cell for at in (m.RESIDUAL, m.RESIDUAL_RATE) for cell in cells(WORK, int(h[at]) + row0, count)]
-        a, b = frames[one["site_a"]], frames[one["site_b"]]
-        made.append(Closure(a, b, tuple(rows[row0 : row0 + count]), residuals, diagonal, roots, scales))
+        factor, of_joint = (diagonal, roots, scales), (tuple(rows[row0 : row0 + count]),)
+        if one["coupling"] >= 0:
+            given, joined, turning = gear(model, h, frames, int(one["coupling"]))
+            made.append(Closure(coupling, given, joined, [*residuals, *turning], *factor))
+        else:
+            joined = [frames[one["site_a"]], frames[one["site_b"]]]
+            made.append(Closure(closure, of_joint, joined, residuals, *factor))
     return made

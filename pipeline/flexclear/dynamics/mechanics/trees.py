@@ -76,6 +76,10 @@ class Bounds(NamedTuple):
     reaching: Any
 
 
+#: where something acts: motion of a body, and a site on it
+End = tuple[Motion, Site]
+
+
 class Body(NamedTuple):
     """A rigid body. com [m], J: inertia about it [kg m^2], axes of the body."""
 
@@ -145,6 +149,16 @@ def carrying(frame: Motion, site: Site) -> Motion:
 
 
 on_body = routine(carried)
+
+
+def moving(frame: Motion, p: Vector) -> Vector:
+    """Return the velocity of the point of a frame's body which is at p in the world."""
+    return frame.v + cross(frame.omega, p - frame.p_WB)
+
+
+def on_both(a: End, b: End, B: Motion, wrench: Wrench) -> tuple[Wrench, Wrench]:
+    """Return a wrench on b about the origin of B, the motion of b's site, and its opposite on a, about their bodies."""
+    return (wrench * -1.0).about(B.p_WB - a[0].p_WB), wrench.about(b[0].R_WB @ b[1].p_BS)
 
 
 @routine
@@ -225,6 +239,12 @@ def without_coordinates(carried_on: int, rest: Resistance, bounds: Bounds, step:
 
 
 free_joint = routine(without_coordinates)
+
+
+@routine
+def added(one: Any, other: Any) -> Any:
+    """Return the sum of two wrenches or numbers."""
+    return one + other
 
 
 def carried_at(step: Step, rest: Resistance) -> Resistance:

@@ -21,10 +21,11 @@ from typing import Any, NamedTuple
 
 from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.code import Program
-from flexclear.dynamics.specialise.tape import FLOAT, Branch, Symbol
+from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, Branch, Loop, Symbol
 
-#: numbers of the scene, the state, its rates, the work space of the engine, and the results of the list's own calls
-SCENE, STATE, RATES, WORK, RESULTS = ARRAYS = "f", "y", "dy", "w", "v"
+#: numbers of the scene, the state, its rates, the work space of the engine, the results of the list's own calls, and
+#: the modes of the contacts, which are integers
+SCENE, STATE, RATES, WORK, RESULTS, MODES = ARRAYS = "f", "y", "dy", "w", "v", "modes"
 
 
 class Cell:
@@ -181,7 +182,10 @@ def _traced(
     """Trace a routine; inside: its numbers, symbolic ones by their run."""
     tape, token = new_tape(), _building.set(None)
     try:
-        symbols = [tape.write(FLOAT, "load", a.run, a.offset) if isinstance(a, Argument) else a for a in inside]
+        symbols = [
+            tape.write(INTEGER if runs[int(a.run)] == MODES else FLOAT, "load", *a) if isinstance(a, Argument) else a
+            for a in inside
+        ]
         result = function(*rebuilt(arguments, iter(symbols)))
     finally:
         _building.reset(token)
@@ -225,6 +229,14 @@ def _described(program: Program) -> Iterator[Any]:
                 for joined, *both in item.joins:
                     numbers[joined] = len(numbers)
                     yield "join", joined.kind, *map(name, both)
+            elif isinstance(item, Loop):
+                yield "loop", *(name(one.first) for one in item.carried)
+                for one in item.carried:
+                    numbers[one.inside] = len(numbers)
+                yield from block(item.blocks[0])
+                yield "left", name(item.condition), *(name(one.left) for one in item.carried)
+                for one in item.carried:
+                    numbers[one.after] = len(numbers)
             else:
                 numbers[item] = len(numbers)
                 yield item.kind, item.operation, *map(name, item.arguments)

@@ -24,11 +24,15 @@ from flexclear.dynamics.routines.emission import interpreter_text, routine_text
 from flexclear.workflow.fingerprint import TREE, library_version, sources_of
 
 DYNAMICS = "flexclear.dynamics"
-#: modules that make code of a tape; and those that make lists
+#: modules that make code of a tape; packages and further modules that make lists
 EMITTING = ("routines.emission", "specialise.code")
-LISTING = (*EMITTING, "memory", "specialise.tape", *(f"routines.{name}" for name in ("calls", "store", "symbols")))
+PACKAGES = ("routines", "mechanics", "contact.form", "contact.friction")
+LISTING = (*EMITTING, "memory", "vectors", *(f"specialise.{name}" for name in ("plain", "tape", "trace")))
+LISTING += ("effects.bushings.bushing", "effects.joint_friction.bearings", "effects.wear.contact")
 LISTING += tuple(
-    f"mechanics.{name}" for name in ("closures", "flexible", "joints", "mechanism", "of_model", "trees", "vectors")
+    f"{package}.{path.stem}"
+    for package in PACKAGES
+    for path in sorted(Path(__file__).parents[1].joinpath(*package.split(".")).glob("*.py"))
 )
 
 

@@ -86,8 +86,8 @@ def address(
 
 
 def has_routines(parts: Parts) -> bool:
-    """Return True when routines know all parts of a mechanism: bodies and ideal joints."""
-    return not (parts.surfaces or parts.loads or set(parts.effects) - {"stiffening"})
+    """Return True when routines know all parts of a mechanism."""
+    return True
 
 
 def call_list(
