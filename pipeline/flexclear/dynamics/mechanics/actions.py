@@ -1,4 +1,4 @@
-"""Contacts and loads of a model: their objects, with the places of their numbers in f, w, n and the state."""
+"""Contacts and loads of a topology: their objects, with the places of their numbers in f, w, n and the state."""
 
 from __future__ import annotations
 
@@ -17,39 +17,34 @@ from flexclear.dynamics.mechanics.loads import STATES, Law, act
 from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link, Rubbed, Rubbing
 from flexclear.dynamics.mechanics.trees import Site
 from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
-from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.routines.calls import MODES, RATES, SCENE, STATE, WORK, Cell, cells
+from flexclear.dynamics.mechanics.tables import Tables
+from flexclear.dynamics.routines.calls import MODES, RATES, STATE, Cell, cells
 
 
-def actions_of(model: Model, h: np.ndarray, ground: Carrier, frames: list[Frame]) -> list[Action]:
+def actions_of(tables: Tables, ground: Carrier, frames: list[Frame]) -> list[Action]:
     """Return all contacts, stops and loads; frames: of all sites."""
-    return [*_contacts(model, h, frames), *_loads(model, h, Frame(ground, Site(ZERO, UNIT)), frames)]
+    return [*_contacts(tables, frames), *_loads(tables, Frame(ground, Site(ZERO, UNIT)), frames)]
 
 
-def _row(h: np.ndarray, table: Any, row: int, array: str) -> list[Cell]:
-    """Return a row of a table of an array."""
-    return cells(array, int(h[table.at]) + table.size * row, table.size)
-
-
-def _contacts(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Action]:
+def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
     """Return contacts and stops, with the places of what steps read of them and of their books."""
-    parts, slot, made = model.parts, model.nq + model.nv, list[Action]()
-    worn = model.arrays.table(m.NAMED["worn"])["contact"].tolist()
-    for c, row in enumerate(model.arrays.table(m.CONTACTS)):
-        numbers = _row(h, m.CONTACT_NUMBERS, c, SCENE)
+    parts, slot, made = tables.parts, tables.nq + tables.nv, list[Action]()
+    worn = tables.table(m.NAMED["worn"])["contact"].tolist()
+    for c, row in enumerate(tables.table(m.CONTACTS)):
+        numbers = tables.row(m.CONTACT_NUMBERS, c)
         law, shape, length = (m.CONTACT_NUMBERS.friction_law, m.CONTACT_NUMBERS.shape, m.CONTACT_NUMBERS.length)
         given = ContactNumbers(*numbers[:law], numbers[law:shape], numbers[shape:length], numbers[length])
-        state = Cell(MODES, c), Cell(WORK, int(h[m.LATCHED]) + c)
-        results = _row(h, m.TOUCH, c, WORK)
+        state = Cell(MODES, c), *tables.stretch(m.LATCHED, c, 1)
+        results = tables.row(m.TOUCH, c)
         results += cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
         form, between = parts.forms[row["normal"]], [frames[row["outer"]], frames[row["inner"]]]
-        if c >= model.arrays.size(m.N_SURFACES):
-            gauge, turns, rates = _gauge(model, row["surfaces"])
+        if c >= tables.size(m.N_SURFACES):
+            gauge, turns, rates = _gauge(tables, row["surfaces"])
             made.append(Action(stop, (form, gauge, given, *state, turns), between, [*results, *rates]))
             continue
         if c in worn:
             size = LEDGER.size
-            results += cells(RATES, slot + model.arrays.size(m.SIZES["wear_slot"]) + size * worn.index(c), size)
+            results += cells(RATES, slot + tables.size(m.SIZES["wear_slot"]) + size * worn.index(c), size)
         bent = 3 if row["bristle"] >= 0 else 0
         friction = parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
         kinds = Kinds(parts.surfaces[row["surfaces"]], form, friction, int(c in worn))
@@ -58,15 +53,15 @@ def _contacts(model: Model, h: np.ndarray, frames: list[Frame]) -> list[Action]:
     return made
 
 
-def _gauge(model: Model, k: int) -> tuple[Gauge, list[Cell], list[Cell]]:
+def _gauge(tables: Tables, k: int) -> tuple[Gauge, list[Cell], list[Cell]]:
     """Return a gauge, with the angle whose full turns it counts, and where the rate of that is stored."""
-    row = model.arrays.table(m.GAUGES)[k]
-    return Gauge(*(int(row[name]) for name in Gauge._fields)), *_internal(model, int(row["turns"]), 1)
+    row = tables.table(m.GAUGES)[k]
+    return Gauge(*(int(row[name]) for name in Gauge._fields)), *_internal(tables, int(row["turns"]), 1)
 
 
-def _internal(model: Model, first: int, count: int) -> tuple[list[Cell], list[Cell]]:
+def _internal(tables: Tables, first: int, count: int) -> tuple[list[Cell], list[Cell]]:
     """Return internal states, none for a negative index, and where their rates are stored."""
-    at = model.ny - model.arrays.size(m.N_INTERNAL) + first
+    at = tables.ny - tables.size(m.N_INTERNAL) + first
     state, rates = (cells(array, at, count if first >= 0 else 0) for array in (STATE, RATES))
     return state, rates
 
@@ -74,8 +69,8 @@ def _internal(model: Model, first: int, count: int) -> tuple[list[Cell], list[Ce
 class _Reading:
     """Frames between which a load acts, then others that it reads; its coordinates; where rates of turns are stored."""
 
-    def __init__(self, model: Model, frames: list[Frame], between: list[Frame]) -> None:
-        self.model, self.sites, self.frames = model, frames, between
+    def __init__(self, tables: Tables, frames: list[Frame], between: list[Frame]) -> None:
+        self.tables, self.sites, self.frames = tables, frames, between
         self.gauged, self.rates = list[tuple[Gauge, list[Cell], int, int]](), list[Cell]()
 
     def frame(self, site: int) -> int:
@@ -86,25 +81,25 @@ class _Reading:
 
     def coordinate(self, k: int) -> int:
         """Add a coordinate by its gauge, and return its number."""
-        gauge, turns, rates = _gauge(self.model, k)
-        row = self.model.arrays.table(m.GAUGES)[k]
+        gauge, turns, rates = _gauge(self.tables, k)
+        row = self.tables.table(m.GAUGES)[k]
         self.gauged.append((gauge, turns, self.frame(row["a"]), self.frame(row["b"])))
         self.rates += rates
         return len(self.gauged) - 1
 
 
-def _loads(model: Model, h: np.ndarray, world: Frame, frames: list[Frame]) -> list[Action]:
+def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
     """Return all loads, with the places of their numbers, laws and states, and of what they store."""
-    rows, kinds, looks = (model.arrays.table(one) for one in (m.LOADS, m.LOAD_KINDS, m.LOOKS))
-    names = [name for name, one in zip(model.parts.loads, kinds, strict=True) for _ in range(one["n_loads"])]
-    ends = {"law0": model.arrays.size(m.N_LAWS), "number0": len(model.arrays.table(m.LOAD_NUMBERS))}
-    ends |= {"look0": len(looks), "bend0": model.arrays.size(m.N_LOAD_BENDS)}
+    rows, kinds, looks = (tables.table(one) for one in (m.LOADS, m.LOAD_KINDS, m.LOOKS))
+    names = [name for name, one in zip(tables.parts.loads, kinds, strict=True) for _ in range(one["n_loads"])]
+    ends = {"law0": tables.size(m.N_LAWS), "number0": tables.size(m.N_LOAD_NUMBERS)}
+    ends |= {"look0": len(looks), "bend0": tables.size(m.N_LOAD_BENDS)}
     spans = [list(pairwise([*rows[name].tolist(), end])) for name, end in ends.items()]
     made = list[Action]()
     for row, name, law, number, look, bend in zip(rows, names, *spans, strict=True):
         kind = tuple(name.split(maxsplit=1))
-        states, rates = _internal(model, int(row["internal0"]), STATES.get(kind[0], 0))
-        reading = _Reading(model, frames, [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]])
+        states, rates = _internal(tables, int(row["internal0"]), STATES.get(kind[0], 0))
+        reading = _Reading(tables, frames, [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]])
         for k in (row["gauge"], row["measured"]):
             if k >= 0:
                 reading.coordinate(k)
@@ -115,44 +110,44 @@ def _loads(model: Model, h: np.ndarray, world: Frame, frames: list[Frame]) -> li
         given = (
             kind,
             int(row["follows"]),
-            cells(SCENE, int(h[m.LOAD_NUMBERS.at]) + number[0], number[1] - number[0]),
-            [Law(*_row(h, m.LAW, k, WORK)[:2]) for k in range(*law)],
+            tables.row(m.LOAD_NUMBERS, number[0], number[1] - number[0]),
+            [Law(*tables.row(m.LAW, k)[:2]) for k in range(*law)],
             states,
             reading.gauged,
             read,
         )
-        bends = [cell for k in range(*bend) for cell in _row(h, m.LOAD_BENDS, k, WORK)]
+        bends = [cell for k in range(*bend) for cell in tables.row(m.LOAD_BENDS, k)]
         made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
     return made
 
 
-def gear(model: Model, h: np.ndarray, frames: list[Frame], k: int) -> tuple[tuple[Any, ...], list[Frame], list[Cell]]:
+def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[tuple[Any, ...], list[Frame], list[Cell]]:
     """Return what `gears.coupling` is given of a gear, the frames of both joints, and where rates of turns are stored.
 
     The second joint comes first.
     """
-    rows, gauges = model.arrays.table(m.NAMED["couplings"])[k], model.arrays.table(m.GAUGES)
+    rows, gauges = tables.table(m.NAMED["couplings"])[k], tables.table(m.GAUGES)
     which = [int(rows[side]) for side in ("second", "first")]
-    how, turns, rates = zip(*(_gauge(model, g) for g in which), strict=True)
+    how, turns, rates = zip(*(_gauge(tables, g) for g in which), strict=True)
     joints = [frames[gauges[g][end]] for g in which for end in ("a", "b")]
     return (
-        (how, turns, *_row(h, m.NAMED["coupling_numbers"], k, SCENE)),
+        (how, turns, *tables.row(m.NAMED["coupling_numbers"], k)),
         joints,
         [cell for one in rates for cell in one],
     )
 
 
-def rubbing_of(model: Model, h: np.ndarray, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
+def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
     """Return the friction of ideal joints, whose links are marked; carriers: the ground, then all links."""
-    table, laws, made = model.arrays.table, model.parts.kinds("joint_friction"), list[Rubbing]()
-    slot = model.arrays.size(m.SIZES["joint_friction_slot"])
+    table, laws, made = tables.table, tables.parts.kinds("joint_friction"), list[Rubbing]()
+    slot = tables.size(m.SIZES["joint_friction_slot"])
     for k, row in enumerate(table(m.NAMED["rubbing"])):
         bearings = []
         for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
-            one, numbers = table(m.NAMED["bearings"])[e], _row(h, m.NAMED["bearing_numbers"], e, SCENE)
+            one, numbers = table(m.NAMED["bearings"])[e], tables.row(m.NAMED["bearing_numbers"], e)
             what = Bearing(int(one["kind"]), laws[one["law"]], int(one["side"]), int(one["axis"]))
             bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
-            bends, load = _row(h, m.NAMED["bends"], e, WORK), _row(h, m.NAMED["bearing"], e, WORK)[0]
+            bends, load = tables.row(m.NAMED["bends"], e), tables.row(m.NAMED["bearing"], e)[0]
             given = BearingNumbers(*numbers[:5], numbers[5:])
             bearings.append(Rubbed(what, given, bristle, [*bends[:3], *rate], load, bends[3:]))
         link = carriers[row["link"]] if row["link"] >= 0 else None

@@ -222,17 +222,24 @@ class Mechanism(NamedTuple):
 
 
 @routine
-def status(sound: Any, least: Any, jammed: Any) -> tuple[Any]:
-    """Return the report of an evaluation (`memory`), from those of `trees.eliminate`, `closures.cholesky` and
-    `bearings.loads_of`."""
-    free = select(jammed > 0.5, float(m.JAMMED), float(m.OK))
-    regular = select(least > c.SINGULAR, free, float(m.SINGULAR))
-    return (select(sound > 0.5, regular, float(m.NOT_POSITIVE)),)
+def status(reports: t.Numbers, sound: Any, least: Any, jammed: Any) -> tuple[Any]:
+    """Return the report of an evaluation, from those of `trees.eliminate`, `closures.cholesky` and `bearings.loads_of`.
+
+    reports: of a sound evaluation, of a jammed mechanism, of a singular pose, of massless coordinates.
+    """
+    sound_one, jam, singular, massless = reports
+    regular = select(least > c.SINGULAR, select(jammed > 0.5, jam, sound_one), singular)
+    return (select(sound > 0.5, regular, massless),)
 
 
-def evaluation(mechanism: Mechanism) -> CallList:
-    """Return the calls that store the rates of the state, and what steps read besides (`specialise.program.KEPT`)."""
-    with CallList().building() as calls:
+#: reports in the order of `status`
+REPORTS = (m.OK, m.JAMMED, m.SINGULAR, m.NOT_POSITIVE)
+
+
+def evaluated(mechanism: Mechanism, calls: CallList) -> CallList:
+    """Append the calls that store the rates of the state, and what steps read besides: contacts, bearings and kinks of
+    loads, residuals of the loops, and the independence of their rows."""
+    with calls.building():
         placed(mechanism)
         supplied = acted(mechanism, calls)
         sound = eliminated(mechanism)
@@ -242,7 +249,7 @@ def evaluation(mechanism: Mechanism) -> CallList:
             supplied += lost
         accelerated(mechanism, calls)
         calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_links(mechanism)]))
-        calls.store([Cell(RESULTS, 0)], status, sound, loops.least, jammed)
+        calls.store([Cell(RESULTS, 0)], status, [calls.number(one) for one in REPORTS], sound, loops.least, jammed)
     return calls
 
 
