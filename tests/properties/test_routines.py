@@ -16,8 +16,8 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
 from flexclear.dynamics.mechanics import closures, flexible, trees
 from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
-from flexclear.dynamics.mechanics.mechanism import evaluation, status
-from flexclear.dynamics.mechanics.of_model import mechanism_of
+from flexclear.dynamics.mechanics.mechanism import REPORTS, status
+from flexclear.dynamics.mechanics.of_topology import list_of
 from flexclear.dynamics.mechanics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.driving import joint_type
@@ -33,6 +33,7 @@ from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
+from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
@@ -76,7 +77,7 @@ def by_routines(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
     y, dy, rows = int(h[m.Y]), int(h[m.SLOPES]), model.arrays.size(m.N_CLOSURE_ROWS)
     for begin, count in ((dy, model.ny), (h[m.RESIDUAL], rows), (h[m.RESIDUAL_RATE], rows), (h[m.PIVOT], min(rows, 1))):
         w[begin : begin + count] = np.nan
-    calls = load(evaluation(mechanism_of(model, h)), silent_text).instance()
+    calls = load(list_of(model.parts, topology_of(model.arrays, h)), silent_text).instance(h)
     h[m.PRESCRIBE], h[m.CALLS] = ctypes.cast(NO_LAWS, ctypes.c_void_p).value, calls.words.ctypes.data
     _EVALUATE(calls.loaded.interpreter)(*(array.ctypes.data for array in (h, f, w, n)), 0.1, y, dy)
     return w, n
@@ -89,7 +90,7 @@ def silent_text(text: str) -> None:
 def assert_alike(found: Evaluated) -> None:
     """Rates of positions, speeds and ledger; residuals, rates and pivots of the loops; the report."""
     model, h, (w, n) = found.model, found.h, by_routines(found)
-    assert has_routines(model.parts)
+    assert has_routines(model)
     rates, speeds = w[h[m.SLOPES] :][: model.ny], model.speeds
     for part in (slice(speeds.start), speeds, slice(speeds.stop, None)):
         assert apart(rates[part], found.rates[part].astype(float)) < ROUNDING
@@ -294,7 +295,9 @@ def test_pivots_of_closures_count_as_share_of_their_row(
 
 def test_reports_of_an_evaluation() -> None:
     """Of massless coordinates first, then of pivots of the loops below 1e-13."""
-    found = [status(sound, least)[0] for sound, least in ((1.0, 1.0), (1.0, 2e-13), (1.0, 5e-14), (0.0, 0.0))]
+    found = [
+        status(REPORTS, *given)[0] for given in ((1.0, 1.0, 0.0), (1.0, 2e-13, 0.0), (1.0, 5e-14, 0.0), (0.0, 0.0, 0.0))
+    ]
     assert found == [m.OK, m.OK, m.SINGULAR, m.NOT_POSITIVE]
 
 
@@ -332,8 +335,8 @@ def undecided(a: Any) -> Any:
 
 def run(calls: CallList, f: np.ndarray) -> np.ndarray:
     """Results of a list after it has run."""
-    found = load(calls, silent_text).instance()
     h, n, w = np.zeros(m.HEADER, dtype=np.int64), np.zeros(m.INTEGERS, dtype=np.int64), np.zeros(1)
+    found = load(calls, silent_text).instance(h)
     h[m.PRESCRIBE], h[m.CALLS] = ctypes.cast(NO_LAWS, ctypes.c_void_p).value, found.words.ctypes.data
     _EVALUATE(found.loaded.interpreter)(*(array.ctypes.data for array in (h, f, w, n)), 0.0, 0, 0)
     return found.results
@@ -382,7 +385,7 @@ def codes(loops: int, links: int) -> tuple[set[str], int]:
     found, calls = set[str](), 0
     for scene in (four_bars(loops, 0.3), hinged(links)):
         model = tabulate(build(scene, {}))
-        made = evaluation(mechanism_of(model, model.arrays.work_space(m.Room(2, 0)).h))
+        made = list_of(model.parts, topology_of(model.arrays, model.arrays.h))
         found |= {code.digest for code in made.codes}
         calls += len(made.calls)
     return found, calls
@@ -398,7 +401,7 @@ def test_numbers_of_a_scene_are_inputs() -> None:
     """A list runs with other masses, and gravity, as one that is made for them."""
     models = [tabulated(Scene.model_validate(rods(5) | more), True) for more in ({}, {"load": GRAVITY})]
     models[1].arrays.f[models[1].arrays.h[m.LINK_NUMBERS.at] + m.LINK_NUMBERS.size] *= 3.0
-    lists = [evaluation(mechanism_of(model, model.arrays.work_space(m.Room(2, 0)).h)) for model in models]
+    lists = [list_of(model.parts, topology_of(model.arrays, model.arrays.h)) for model in models]
     assert [call.offsets for call in lists[0].calls] == [call.offsets for call in lists[1].calls]
     assert [call.code.digest for call in lists[0].calls] == [call.code.digest for call in lists[1].calls]
     assert_alike(evaluated(models[1]))

@@ -1,24 +1,26 @@
-"""Contacts and loads of a topology: their objects, with the places of their numbers in f, w, n and the state."""
+"""Contacts, loads, gears and friction of a topology: their objects, with the places of their numbers in the arrays."""
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.effects.wear.contact import LEDGER
-from flexclear.dynamics.mechanics.bearings import Bearing, BearingNumbers
-from flexclear.dynamics.mechanics.contacts import ContactNumbers, Kinds, stop, touch
-from flexclear.dynamics.mechanics.coordinates import Gauge
+from flexclear.dynamics.mechanics.contacts import stop, touch
+from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.loads import STATES, Law, act
 from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link, Rubbed, Rubbing
+from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Site
 from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
-from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.routines.calls import MODES, RATES, STATE, Cell, cells
+
+#: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
+Gauge: Any = namedtuple("Gauge", "turning side axis sine_f sine_g cosine_f cosine_g")
+Bearing: Any = namedtuple("Bearing", "kind side axis")
 
 
 def actions_of(tables: Tables, ground: Carrier, frames: list[Frame]) -> list[Action]:
@@ -30,30 +32,30 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
     """Return contacts and stops, with the places of what steps read of them and of their books."""
     parts, slot, made = tables.parts, tables.nq + tables.nv, list[Action]()
     worn = tables.table(m.NAMED["worn"])["contact"].tolist()
+    wear0 = slot + tables.size(m.SIZES["wear_slot"])
     for c, row in enumerate(tables.table(m.CONTACTS)):
-        numbers = tables.row(m.CONTACT_NUMBERS, c)
-        law, shape, length = (m.CONTACT_NUMBERS.friction_law, m.CONTACT_NUMBERS.shape, m.CONTACT_NUMBERS.length)
-        given = ContactNumbers(*numbers[:law], numbers[law:shape], numbers[shape:length], numbers[length])
-        state = Cell(MODES, c), *tables.stretch(m.LATCHED, c, 1)
-        results = tables.row(m.TOUCH, c)
-        results += cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
-        form, between = parts.forms[row["normal"]], [frames[row["outer"]], frames[row["inner"]]]
-        if c >= tables.size(m.N_SURFACES):
+        numbers, closed, latched = (
+            tables.record("contact_numbers", c),
+            Cell(MODES, c),
+            tables.stretch(m.LATCHED, c, 1)[0],
+        )
+        books = cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
+        results, form = [*tables.row(m.NAMED["touch"], c), *books], parts.forms[row["normal"]]
+        if c < tables.size(m.N_SURFACES):
+            if c in worn:
+                results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)
+            bristle, rates = (cells(array, int(row["bristle"]), 3 * (row["bristle"] >= 0)) for array in (STATE, RATES))
+            laws = form, parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
+            given = parts.surfaces[row["surfaces"]], laws, int(c in worn), numbers, closed, latched, bristle
+        else:
             gauge, turns, rates = _gauge(tables, row["surfaces"])
-            made.append(Action(stop, (form, gauge, given, *state, turns), between, [*results, *rates]))
-            continue
-        if c in worn:
-            size = LEDGER.size
-            results += cells(RATES, slot + tables.size(m.SIZES["wear_slot"]) + size * worn.index(c), size)
-        bent = 3 if row["bristle"] >= 0 else 0
-        friction = parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
-        kinds = Kinds(parts.surfaces[row["surfaces"]], form, friction, int(c in worn))
-        bristle, rates = (cells(array, int(row["bristle"]), bent) for array in (STATE, RATES))
-        made.append(Action(touch, (kinds, given, *state, bristle), between, [*results, *rates]))
+            given = form, gauge, numbers, closed, latched, turns
+        ends = [frames[row["outer"]], frames[row["inner"]]]
+        made.append(Action(touch if len(given) == 7 else stop, given, ends, [*results, *rates]))
     return made
 
 
-def _gauge(tables: Tables, k: int) -> tuple[Gauge, list[Cell], list[Cell]]:
+def _gauge(tables: Tables, k: int) -> tuple[Any, list[Cell], list[Cell]]:
     """Return a gauge, with the angle whose full turns it counts, and where the rate of that is stored."""
     row = tables.table(m.GAUGES)[k]
     return Gauge(*(int(row[name]) for name in Gauge._fields)), *_internal(tables, int(row["turns"]), 1)
@@ -71,7 +73,7 @@ class _Reading:
 
     def __init__(self, tables: Tables, frames: list[Frame], between: list[Frame]) -> None:
         self.tables, self.sites, self.frames = tables, frames, between
-        self.gauged, self.rates = list[tuple[Gauge, list[Cell], int, int]](), list[Cell]()
+        self.gauged, self.rates = list[tuple[Any, list[Cell], int, int]](), list[Cell]()
 
     def frame(self, site: int) -> int:
         """Return the number of a site's frame."""
@@ -111,18 +113,18 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
             kind,
             int(row["follows"]),
             tables.row(m.LOAD_NUMBERS, number[0], number[1] - number[0]),
-            [Law(*tables.row(m.LAW, k)[:2]) for k in range(*law)],
+            [Law(*tables.record("law", k)[:2]) for k in range(*law)],
             states,
             reading.gauged,
             read,
         )
-        bends = [cell for k in range(*bend) for cell in tables.row(m.LOAD_BENDS, k)]
+        bends = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
         made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
     return made
 
 
-def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[tuple[Any, ...], list[Frame], list[Cell]]:
-    """Return what `gears.coupling` is given of a gear, the frames of both joints, and where rates of turns are stored.
+def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[Any, tuple[Any, ...], list[Frame], list[Cell]]:
+    """Return the routine of a gear, what it is given, the frames of both joints, and where rates of turns are stored.
 
     The second joint comes first.
     """
@@ -130,11 +132,7 @@ def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[tuple[Any, ...], 
     which = [int(rows[side]) for side in ("second", "first")]
     how, turns, rates = zip(*(_gauge(tables, g) for g in which), strict=True)
     joints = [frames[gauges[g][end]] for g in which for end in ("a", "b")]
-    return (
-        (how, turns, *tables.row(m.NAMED["coupling_numbers"], k)),
-        joints,
-        [cell for one in rates for cell in one],
-    )
+    return coupling, (how, turns, tables.record("coupling_numbers", k)), joints, [cell for one in rates for cell in one]
 
 
 def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
@@ -144,12 +142,12 @@ def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier])
     for k, row in enumerate(table(m.NAMED["rubbing"])):
         bearings = []
         for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
-            one, numbers = table(m.NAMED["bearings"])[e], tables.row(m.NAMED["bearing_numbers"], e)
-            what = Bearing(int(one["kind"]), laws[one["law"]], int(one["side"]), int(one["axis"]))
+            one = table(m.NAMED["bearings"])[e]
+            what, numbers = Bearing(*(int(one[name]) for name in Bearing._fields)), tables.record("bearing_numbers", e)
             bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
-            bends, load = tables.row(m.NAMED["bends"], e), tables.row(m.NAMED["bearing"], e)[0]
-            given = BearingNumbers(*numbers[:5], numbers[5:])
-            bearings.append(Rubbed(what, given, bristle, [*bends[:3], *rate], load, bends[3:]))
+            bends, load = tables.row(m.NAMED["bends"], e), tables.record("bearing", e).load
+            given = what, laws[one["law"]], numbers, bristle
+            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:]))
         link = carriers[row["link"]] if row["link"] >= 0 else None
         if isinstance(link, Link):
             link.rubbed = True

@@ -37,26 +37,6 @@ ITERATIONS, CONVERGED, ROUNDED, STRIDES, SINGULAR = 30.0, 1e-13, 1e-9, 32.0, 1e-
 GOES_ON, FOUND, FAILED = 0.0, 1.0, 2.0
 
 
-class Bearing(NamedTuple):
-    """What a bearing is: its kind, its friction law, and the frame (0, 1) and axis along it."""
-
-    kind: int
-    law: str
-    side: int
-    axis: int
-
-
-class BearingNumbers(NamedTuple):
-    """See `effects.joint_friction`."""
-
-    radius: Any
-    lever: Any
-    axial: Any
-    torsion: Any
-    preload: Any
-    law: Numbers
-
-
 class Pressure(NamedTuple):
     """Normal force of a bearing, its slopes by the moment and the force of its joint, and its parts with kinks."""
 
@@ -67,8 +47,8 @@ class Pressure(NamedTuple):
 
 
 @routine
-def friction_of(bearing: Bearing, numbers: BearingNumbers, bristle: Numbers, a: End, b: End) -> Any:
-    """Return sliding velocity and bristles' rate; wrenches on both bodies, and on the second one at its frame, per
+def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, b: End) -> Any:
+    """Return, of a bearing (`effects.joint_friction`), sliding velocity and bristles' rate; wrenches on both bodies, and on the second one at its frame, per
     normal force; lost power per normal force [m/s]; axes of the frame that carries the bearing."""
     F, G = carried(*a), carried(*b)
     R, r = (G if bearing.side else F).R_WB, G.p_WB - F.p_WB
@@ -79,13 +59,12 @@ def friction_of(bearing: Bearing, numbers: BearingNumbers, bristle: Numbers, a: 
         forth = dot(n, sliding) if bearing.kind != PIN else 0.0
         round_ = numbers.radius * dot(n, turning) if bearing.kind != SLIDER else 0.0
         slip = Vector([forth, round_, 0.0])
-    friction = rub(bearing.law, numbers.law, Vector(bristle) if bristle else ZERO, slip, 1.0)
+    force, _, _, rate = rub(law, numbers.law, bristle, slip, 1.0)
     if bearing.kind == BALL:
-        unit = Wrench(numbers.radius * (F.R_WB @ friction.force), ZERO)
+        unit = Wrench(numbers.radius * (F.R_WB @ force), ZERO)
     else:
-        unit = Wrench((numbers.radius * friction.force[1]) * n, friction.force[0] * n)
-    stored = slip, friction.rate if bristle else ()
-    return stored, on_both(a, b, G, unit), unit, -dot(friction.force, slip), R
+        unit = Wrench((numbers.radius * force[1]) * n, force[0] * n)
+    return (slip, rate if bristle else ()), on_both(a, b, G, unit), unit, -dot(force, slip), R
 
 
 @routine
@@ -124,7 +103,7 @@ def direction(v: Vector) -> tuple[Any, Vector]:
     return size, select(size > 0.0, 1.0 / size, 0.0) * v
 
 
-def pressure(bearing: Bearing, numbers: BearingNumbers, R_WB: Matrix, reaction: Wrench) -> Pressure:
+def pressure(bearing: Any, numbers: Any, R_WB: Matrix, reaction: Wrench) -> Pressure:
     """Return the normal force of a bearing for the wrench of its joint."""
     M, F = reaction
     if bearing.kind == BALL:
@@ -144,7 +123,7 @@ def pressure(bearing: Bearing, numbers: BearingNumbers, R_WB: Matrix, reaction: 
 
 @routine
 def loads_of(
-    bearings: Sequence[tuple[Bearing, BearingNumbers, Matrix]],
+    bearings: Sequence[tuple[Any, Any, Matrix]],
     smooth: Sequence[Wrench],
     influence: Sequence[Sequence[Wrench]],
 ) -> Any:
@@ -206,9 +185,9 @@ def loads_of(
 
 
 @routine
-def lost(loads: Numbers, losses: Numbers) -> Any:
-    """Return the power that friction of bearings takes [W], from that per normal force."""
-    return sum((load * loss for load, loss in zip(loads, losses, strict=True)), 0.0)
+def lost(load: Any, loss: Any) -> Any:
+    """Return the power that friction of a bearing takes [W], from that per normal force."""
+    return load * loss
 
 
 def solution(A: Sequence[Sequence[Any]], b: Numbers) -> tuple[list[Any], Any]:

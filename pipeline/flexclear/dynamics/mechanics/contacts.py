@@ -2,15 +2,18 @@
 
 Both forces act at one point Q on the inner surface, so that they conserve angular momentum; the sliding velocity is
 that of the material points at Q, so that rolling is no sliding. A stop's gap is one along the coordinate.
+
+What steps read is a row of `memory.TOUCH`, followed by the rates of the books: power of damping, power of friction,
+impulse; of contacts with wear sliding distance and load path (Archard 1953, Journal of Applied Physics 24, 981-988).
 Source: Wang & Wang (2019), eqs. (23), (24).
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from flexclear.dynamics.effects import FORMS, FRICTION_LAWS
-from flexclear.dynamics.mechanics.coordinates import Gauge, along
+from flexclear.dynamics.mechanics.coordinates import along
 from flexclear.dynamics.mechanics.surfaces import SURFACES, across
 from flexclear.dynamics.mechanics.trees import End, Numbers, carried, moving, on_both
 from flexclear.dynamics.mechanics.vectors import ZERO, Vector, Wrench, cross, dot
@@ -19,136 +22,74 @@ from flexclear.dynamics.routines.symbols import branch, larger, shared, sqrt
 from flexclear.scene.registry import lookup
 
 
-class ContactNumbers(NamedTuple):
-    """Numbers of a contact; see `memory.CONTACT_NUMBERS`."""
+def push(form: str, numbers: Any, depth: Any, approach: Any, latched: Any) -> tuple[Any, Any, Any]:
+    """Return the normal force of a law [N or N m], the power that its damping takes, and the energy that it stores.
 
-    clearance: Any
-    radius: Any
-    floor: Any
-    stick_speed: Any
-    stiffness: Any
-    exponent: Any
-    damping: Any
-    friction_law: Numbers
-    shape: Numbers
-    length: Any
-
-
-class Push(NamedTuple):
-    """Normal force of a contact [N or N m], power [W] that its damping takes, energy [J] that it stores."""
-
-    size: Any
-    lost: Any
-    stored: Any
-
-
-class Rub(NamedTuple):
-    """Friction on the inner body [N], power [W] that it takes, energy [J] in bristles, and the rate of these [m/s]."""
-
-    force: Vector = ZERO
-    lost: Any = 0.0
-    stored: Any = 0.0
-    rate: Vector = ZERO
-
-
-class Touch(NamedTuple):
-    """What steps read of a contact; see `memory.TOUCH`. The other defaults are those of an open one."""
-
-    gap: Any
-    approach: Any
-    normal_force: Any = 0.0
-    friction_power: Any = 0.0
-    damping_power: Any = 0.0
-    stored: Any = 0.0
-    bent: Any = 0.0
-    slip: Any = 0.0
-    force: Vector = ZERO
-    offset: Vector = ZERO
-    point: Vector = ZERO
-
-
-class Kinds(NamedTuple):
-    """Surfaces of a contact, form of its normal force, its friction law or "", and whether it wears (1) or not (0)."""
-
-    surfaces: str
-    form: str
-    friction: str
-    worn: int
-
-
-def push(form: str, numbers: ContactNumbers, depth: Any, approach: Any, latched: Any) -> Push:
-    """Return the normal force at a penetration; latched: the rate at which this contact began."""
+    depth: penetration.  latched: the rate at which this contact began.
+    """
     law, depth = lookup(FORMS, form, where="contact"), larger(0.0, depth)
     elastic, damping = shared(law.force)(depth, approach, larger(latched, numbers.floor), numbers)
-    return Push(larger(0.0, elastic + damping), damping * approach, shared(law.stored)(depth, numbers))
+    return larger(0.0, elastic + damping), damping * approach, shared(law.stored)(depth, numbers)
 
 
-def rub(law: str, numbers: Numbers, bristle: Vector, slip: Vector, normal_force: Any) -> Rub:
-    """Return the friction of a law at a sliding velocity."""
+def rub(law: str, numbers: Numbers, bristle: Numbers, slip: Vector, N: Any) -> tuple[Vector, Any, Any, Vector]:
+    """Return the friction of a law (none: "") on the inner body, the power that it takes, the energy that its bristles
+    store, and their rate; slip: sliding velocity."""
+    if not law:
+        return ZERO, 0.0, 0.0, ZERO
     traction = shared(lookup(FRICTION_LAWS, law, where="contact").traction)
-    force, lost, stored, rate = traction(bristle, slip, normal_force, numbers)
-    return Rub(Vector(force), lost, stored, Vector(rate))
+    force, lost, bent, rate = traction(bristle or ZERO, slip, N, numbers)
+    return Vector(force), lost, bent, Vector(rate)
 
 
 @routine
 def touch(
-    kinds: Kinds, numbers: ContactNumbers, closed: Any, latched: Any, bristle: Numbers, outer: End, inner: End
+    surfaces: str,
+    laws: tuple[str, str],
+    worn: int,
+    numbers: Any,
+    closed: Any,
+    latched: Any,
+    bristle: Numbers,
+    *ends: End,
 ) -> Any:
-    """Return `Touch` with the rates of a contact's books, wear and bristles; then the wrenches on both bodies.
+    """Return what steps read of a contact, the rates of its books and bristles; then the wrenches on both bodies.
 
-    closed: 1 where the surfaces touch.  bristle: deflection, in axes of the outer frame, of a law that has some.
+    laws: form of its normal force, friction law or "".  worn: 1 with wear, else 0.  closed: 1 where the surfaces touch.
+    bristle: deflection, in axes of the outer frame, of a law that has some.  ends: of the outer and the inner surface.
     """
-    A, B = carried(*outer), carried(*inner)
+    A, B = (carried(*end) for end in ends)
     p = B.p_WB - A.p_WB
-    gap, approach, n, turning, offset = SURFACES[kinds.surfaces](numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p))
+    near = SURFACES[surfaces](numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p))
+    gap, approach, n, turning, offset = near
     z = across(n, A.R_WB @ Vector(bristle)) if bristle else ZERO
-    apart = Touch(gap, approach, offset=A.R_WB.T @ offset)
 
-    def forces() -> tuple[Touch, Numbers, Vector]:
-        normal = push(kinds.form, numbers, -gap, approach, latched)
+    def forces() -> Any:
+        N, taken, stored = push(laws[0], numbers, -gap, approach, latched)
         Q = B.p_WB + numbers.radius * n
         slip = across(n, moving(B, Q) - moving(A, Q))
         speed = sqrt(dot(slip, slip))
-        friction = rub(kinds.friction, numbers.friction_law, z, slip, normal.size) if kinds.friction else Rub()
-        now = apart._replace(
-            normal_force=normal.size,
-            friction_power=-friction.lost,
-            damping_power=normal.lost,
-            stored=normal.stored,
-            bent=friction.stored,
-            slip=speed if kinds.friction else 0.0,
-            force=friction.force - normal.size * n,
-            point=Q,
-        )
-        books = normal.lost, -dot(friction.force, slip), normal.size, speed, speed * normal.size
-        return now, books, A.R_WB.T @ (across(n, friction.rate) - dot(turning, z) * n)
+        friction, lost, bent, z_rate = rub(laws[1], numbers.friction_law, z, slip, N)
+        rate = A.R_WB.T @ (across(n, z_rate) - dot(turning, z) * n)
+        read = N, -lost, taken, stored, bent, speed if laws[1] else 0.0
+        return read, friction - N * n, Q, (taken, -dot(friction, slip), N, speed, speed * N), rate
 
-    now, books, rate = branch(closed == 1, forces, lambda: (apart, (0.0,) * 5, ZERO))
-    wrench = Wrench(cross(now.point - B.p_WB, now.force), now.force)
-    return (now, books[: 5 if kinds.worn else 3], rate if bristle else ()), on_both(outer, inner, B, wrench), ()
+    apart = (0.0,) * 6, ZERO, ZERO, (0.0,) * 5, ZERO
+    read, F, Q, books, rate = branch(closed == 1, forces, lambda: apart)
+    stored = gap, approach, read, F, A.R_WB.T @ offset, Q, books[: 5 if worn else 3], rate if bristle else ()
+    return stored, on_both(*ends, B, Wrench(cross(Q - B.p_WB, F), F)), ()
 
 
 @routine
-def stop(
-    form: str, gauge: Gauge, numbers: ContactNumbers, closed: Any, latched: Any, turns: Numbers, a: End, b: End
-) -> Any:
-    """Return the same as `touch` of the end of a joint coordinate, which pushes along that; and the rate of turns."""
-    F, G = carried(*a), carried(*b)
+def stop(form: str, gauge: Any, numbers: Any, closed: Any, latched: Any, turns: Numbers, *ends: End) -> Any:
+    """Return the same of the end of a joint coordinate, and the rate of its turns; the force acts along it."""
+    F, G = (carried(*end) for end in ends)
     value, rate, unit = along(gauge, turns, F, G)
     limit, sense = numbers.shape
-    gap = sense * (limit - value)
-    apart = Touch(gap, sense * rate, offset=Vector([numbers.clearance - gap, 0.0, 0.0]))
-
-    def force() -> tuple[Touch, Numbers, Any]:
-        normal = push(form, numbers, -gap, sense * rate, latched)
-        wrench = unit * (-sense * normal.size)
-        now = apart._replace(
-            normal_force=normal.size,
-            damping_power=normal.lost,
-            stored=normal.stored,
-            force=wrench.moment if gauge.turning else wrench.force,
-        )
-        return now, (normal.lost, 0.0, normal.size), wrench
-
-    now, books, wrench = branch(closed == 1, force, lambda: (apart, (0.0,) * 3, Wrench(ZERO, ZERO)))
-    return (now, books, [rate for _ in turns]), on_both(a, b, G, wrench), ()
+    gap, approach = sense * (limit - value), sense * rate
+    law = branch(closed == 1, lambda: push(form, numbers, -gap, approach, latched), lambda: (0.0, 0.0, 0.0))
+    N, taken, stored = law
+    wrench = unit * (-sense * N)
+    force = wrench.moment if gauge.turning else wrench.force
+    read = gap, approach, (N, 0.0, taken, stored, 0.0, 0.0), force, (numbers.clearance - gap, 0.0, 0.0), ZERO
+    return (read, (taken, 0.0, N), [rate for _ in turns]), on_both(*ends, G, wrench), ()

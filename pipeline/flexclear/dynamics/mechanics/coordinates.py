@@ -10,18 +10,6 @@ from flexclear.dynamics.mechanics.vectors import ZERO, Wrench, cross, dot
 from flexclear.dynamics.routines.symbols import arctan2, nearest
 
 
-class Gauge(NamedTuple):
-    """How to measure a coordinate; see `memory.GAUGES`."""
-
-    turning: int
-    side: int
-    axis: int
-    sine_f: int
-    sine_g: int
-    cosine_f: int
-    cosine_g: int
-
-
 class Along(NamedTuple):
     """A coordinate [rad or m] and its rate; unit: wrench of a unit force along it, on the second body at its frame."""
 
@@ -30,8 +18,11 @@ class Along(NamedTuple):
     unit: Wrench
 
 
-def along(gauge: Gauge, turns: Numbers, F: Motion, G: Motion) -> Along:
-    """Return the coordinate between frames; turns: an earlier value, from which an angle's full turns are counted."""
+def along(gauge: Any, turns: Numbers, F: Motion, G: Motion) -> Along:
+    """Return the coordinate between frames.
+
+    gauge: how to measure it (`memory.GAUGES`).  turns: an earlier value, from which an angle's full turns are counted.
+    """
     axis = (G if gauge.side else F).R_WB.column(gauge.axis)
     if gauge.turning:
         entries = (gauge.sine_f, gauge.sine_g), (gauge.cosine_f, gauge.cosine_g)
@@ -43,7 +34,7 @@ def along(gauge: Gauge, turns: Numbers, F: Motion, G: Motion) -> Along:
     return Along(dot(axis, r), dot(axis, G.v - F.v - cross(F.omega, r)), Wrench(ZERO, axis))
 
 
-def bias(gauge: Gauge, F: Motion, G: Motion) -> Any:
+def bias(gauge: Any, F: Motion, G: Motion) -> Any:
     """Return the known part of the second rate of the coordinate between frames."""
     side = G if gauge.side else F
     axis = side.R_WB.column(gauge.axis)

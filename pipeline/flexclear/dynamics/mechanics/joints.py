@@ -28,7 +28,7 @@ class Relative(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A joint type. motion: Relative of positions and speeds.  rate: of the positions, which may be more by `redundant`."""
+    """A joint type. motion: Relative of positions and speeds.  rate: of the positions, more by `redundant`."""
 
     motion: Callable[[Any, Any], Relative]
     rate: Callable[[Any, Any], Any] = lambda x, u: u

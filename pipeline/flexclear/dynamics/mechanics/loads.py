@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from flexclear.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.dynamics.mechanics.bushings import bushing
-from flexclear.dynamics.mechanics.coordinates import Along, Gauge, along
+from flexclear.dynamics.mechanics.coordinates import Along, along
 from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, carried, on_both
 from flexclear.dynamics.mechanics.vectors import UNIT, ZERO, Matrix, Vector, Wrench, dot
 from flexclear.dynamics.routines import symbols
@@ -230,7 +230,7 @@ def act(
     numbers: Numbers,
     laws: Sequence[Law],
     states: Numbers,
-    gauged: Sequence[tuple[Gauge, Numbers, int, int]],
+    gauged: Sequence[tuple[Any, Numbers, int, int]],
     read: Sequence[tuple[int, int]],
     *ends: End,
 ) -> Any:

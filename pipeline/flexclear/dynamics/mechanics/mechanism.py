@@ -182,12 +182,13 @@ class Action(NamedTuple):
 
 
 class Rubbed(NamedTuple):
-    """A bearing with friction. bristle: its state.  sliding, load, bends: where its sliding velocity with the bristle's
-    rate, its load, and the parts of that with kinks are stored."""
+    """A bearing with friction. given: what it is, its law and its numbers, and the state of its bristles.
 
-    bearing: b.Bearing
-    numbers: b.BearingNumbers
-    bristle: Cells
+    sliding, load, bends: where its sliding velocity with the bristles' rate, its load, and the parts of that with kinks
+    are stored.
+    """
+
+    given: tuple[Any, ...]
     sliding: Cells
     load: Cell
     bends: Cells
@@ -275,7 +276,7 @@ def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
                 frame.push(wrench)
             elif isinstance(link, Link):
                 rigidly[link] = t.added(rigidly[link], wrench) if link in rigidly else wrench
-        powers += [(one.book + k, power) for k, power in enumerate(supplied) if power != 0.0]
+        powers += [(one.book + k, power) for k, power in enumerate(supplied) if not _zero(power)]
     for link, wrench in rigidly.items():
         link.beyond.append((t.pushed(wrench), ()))
     return powers
@@ -396,52 +397,45 @@ class Influence(NamedTuple):
 def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tuple[int, Any]], Any]:
     """Add friction of joints to the forces of all links, and to those on drives; return lost powers by their books, and
     1 where friction jams the mechanism."""
-    influences, losses, bearings = list[tuple[Rubbing, Influence]](), dict[int, list[Any]](), list[Any]()
-    for joint in mechanism.rubbing:
+    joints, influences, powers, bearings = mechanism.rubbing, list[Influence](), list[Any](), list[Any]()
+    of_bearing = [k for k, joint in enumerate(joints) for _ in joint.bearings]
+    for joint in joints:
         ends, wrenches, units = [frame.placed for frame in joint.frames], list[Any](), list[Wrench]()
         for one in joint.bearings:
-            given = one.bearing, one.numbers, one.bristle, *ends
-            on_both, unit, loss, R_WB = calls.store(one.sliding, b.friction_of, *given)
+            on_both, unit, loss, R_WB = calls.store(one.sliding, b.friction_of, *one.given, *ends)
             wrenches.append(on_both)
             units.append(unit)
-            losses.setdefault(joint.book, []).append(loss)
-            bearings.append((one.bearing, one.numbers, R_WB))
-        spread, *_ = passed_inwards(
-            list(zip(joint.frames, zip(*wrenches, strict=True), strict=True)), [0.0] * len(units)
-        )
-        influences += [(joint, influence(loops, spread, k, unit)) for k, unit in enumerate(units)]
+            powers.append((joint.book, loss))
+            bearings.append((one.given[0], one.given[2], R_WB))
+        ends_of_rows = list(zip(joint.frames, zip(*wrenches, strict=True), strict=True))
+        spread, *_ = passed_inwards(ends_of_rows, [0.0] * len(units))
+        influences += [influence(loops, spread, k, unit) for k, unit in enumerate(units)]
 
     without = {moved: moved.forces for link in mechanism.links for moved in (link, link.modes) if moved}
     accelerated(mechanism)
-    smooth = [reaction(mechanism, loops, joint) for joint in mechanism.rubbing]
-    parts = []
-    for of_joint, one in influences:
+    smooth, parts = [reaction(loops, joint) for joint in joints], list[list[Wrench]]()
+    for one, of_joint in zip(influences, of_bearing, strict=True):
         for moved, forces in without.items():
             moved.forces = one.forces.get(moved, [0.0] * len(forces))
         accelerated(mechanism)
-        parts.append([reaction(mechanism, loops, joint, one, joint is of_joint) for joint in mechanism.rubbing])
-    of_bearing = [k for k, joint in enumerate(mechanism.rubbing) for _ in joint.bearings]
-    cells = [one for joint in mechanism.rubbing for one in joint.bearings]
-    loads = [one.load for one in cells]
+        parts.append([reaction(loops, joint, one, own=k == of_joint) for k, joint in enumerate(joints)])
+    places = [one for joint in joints for one in joint.bearings]
+    loads, results = [one.load for one in places], [cell for one in places for cell in one.bends]
     given = bearings, [smooth[k] for k in of_bearing], [[part[k] for part in parts] for k in of_bearing]
-    jammed = calls.store([*loads, *(cell for one in cells for cell in one.bends)], b.loads_of, *given)
+    jammed = calls.store([*loads, *results], b.loads_of, *given)
 
     for moved, forces in without.items():
-        V = [one.forces.get(moved, [0.0] * len(forces)) for _, one in influences]
+        V = [one.forces.get(moved, [0.0] * len(forces)) for one in influences]
         moved.forces = c.with_multipliers(forces, list(zip(*V, strict=True)), loads)
     for number, before in loops.multipliers.items():
-        rows = list(zip(*(one.multipliers[number] for _, one in influences), strict=True))
+        rows = list(zip(*(one.multipliers[number] for one in influences), strict=True))
         more = c.with_multipliers([0.0] * len(before), rows, loads)
         for link, on_it in loops.found[number].through.items():
             link.closing.append((on_it, more))
-    for (_, one), load in zip(influences, loads, strict=True):
+    for one, load in zip(influences, loads, strict=True):
         for link, wrench in one.through.items():
             link.closing.append(([wrench], [load]))
-    begins = dict[int, Any]()
-    at = iter(loads)
-    for joint in mechanism.rubbing:
-        begins[joint.book] = b.lost([next(at) for _ in joint.bearings], losses[joint.book])
-    return list(begins.items()), jammed
+    return [(book, b.lost(load, loss)) for load, (book, loss) in zip(loads, powers, strict=True)], jammed
 
 
 def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
@@ -461,17 +455,13 @@ def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
     return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
 
 
-def reaction(
-    mechanism: Mechanism, loops: Loops, joint: Rubbing, by: Influence | None = None, own: bool = False
-) -> Wrench:
+def reaction(loops: Loops, joint: Rubbing, by: Influence | None = None, *, own: bool = False) -> Wrench:
     """Return the wrench of a joint on its second body at present accelerations: without friction, or `by` that of a
-    bearing alone; own: True for one of the joint itself."""
-    second = joint.frames[1].placed
-    multipliers = by.multipliers if by else loops.multipliers
-    if joint.link is None:
+    bearing alone; own: True for a bearing of the joint itself."""
+    second, link, multipliers = joint.frames[1].placed, joint.link, (by or loops).multipliers
+    if link is None:
         given = loops.on_second.get(joint.closure, []), multipliers.get(joint.closure, [])
         return b.reaction_in_loop(*given, [by.unit] if by and own else [], second)
-    link = joint.link
     passing = [(one.through[link], multipliers[number]) for number, one in loops.found.items() if link in one.through]
     if by and not own and link in by.through:
         passing.append(([by.through[link]], [1.0]))
@@ -540,5 +530,10 @@ def booked(mechanism: Mechanism, powers: Iterable[tuple[int, Any]]) -> list[Any]
     """Return the rates of the ledger's books: sums of powers."""
     sums: dict[int, Any] = dict.fromkeys(mechanism.ledger, 0.0)
     for book, power in powers:
-        sums[book] = t.added(sums[book], power) if sums[book] else power
+        sums[book] = power if _zero(sums[book]) else t.added(sums[book], power)
     return list(sums.values())
+
+
+def _zero(number: Any) -> bool:
+    """Return True for a number that is known to be zero."""
+    return isinstance(number, float) and number == 0.0

@@ -11,12 +11,11 @@ from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
-from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.joints import JOINTS
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes, evaluated
+from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
-from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.routines.calls import RATES, STATE, CallList, Cell, cells
 from flexclear.dynamics.routines.straight import OneTape
 from flexclear.dynamics.specialise.code import Program
@@ -59,7 +58,10 @@ def mechanism_of(tables: Tables) -> Mechanism:
     stored = {cell.key for one in (*actions, *closures) for cell in one.results}
     stored |= {cell.key for joint in rubbing for one in joint.bearings for cell in one.sliding}
     books = enumerate(cells(RATES, tables.nq + tables.nv, tables.size(m.N_LEDGER)))
-    ledger, (least,) = {k: cell for k, cell in books if cell.key not in stored}, tables.stretch(m.PIVOT, m.LAST_PIVOT, 1)
+    ledger, (least,) = (
+        {k: cell for k, cell in books if cell.key not in stored},
+        tables.stretch(m.PIVOT, m.LAST_PIVOT, 1),
+    )
     return Mechanism(ground, links, closures, actions, rubbing, tables.row(m.GRAVITY, 0), ledger, least)
 
 
@@ -158,8 +160,8 @@ def _closures(tables: Tables, frames: list[Frame]) -> list[Closure]:
         residuals = [cell for at in (m.RESIDUAL, m.RESIDUAL_RATE) for cell in tables.stretch(at, row0, count)]
         factor, of_joint = (diagonal, roots, scales), (tuple(rows[row0 : row0 + count]),)
         if one["coupling"] >= 0:
-            given, joined, turning = gear(tables, frames, int(one["coupling"]))
-            made.append(Closure(coupling, given, joined, [*residuals, *turning], *factor))
+            *how, turning = gear(tables, frames, int(one["coupling"]))
+            made.append(Closure(*how, [*residuals, *turning], *factor))
         else:
             joined = [frames[one["site_a"]], frames[one["site_b"]]]
             made.append(Closure(closure, of_joint, joined, residuals, *factor))

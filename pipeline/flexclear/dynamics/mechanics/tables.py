@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -14,16 +16,18 @@ from flexclear.dynamics.routines.calls import SCENE, WORK, Cell, cells
 from flexclear.dynamics.specialise import topology as topologies
 
 
+@cache
+def _record(name: str) -> Any:
+    make: Any = namedtuple
+    return make(name, m.row_fields(name))
+
+
 @dataclass(frozen=True)
 class Tables:
     """Kinds of a mechanism's parts, and its topology. Places in f and w count from the start of their stretch."""
 
     parts: Parts
     topology: topologies.Topology
-
-    @cached_property
-    def _h(self) -> np.ndarray:
-        return np.array(topologies.header(self.topology), dtype=np.int64)
 
     def size(self, index: int) -> int:
         """Return a size from the header."""
@@ -53,6 +57,11 @@ class Tables:
         """Return rows of a table of f or w from row k on."""
         array = SCENE if table in m.TABLES["f"] else WORK
         return cells(array, topologies.start(table.at) + table.size * int(k), table.size * count)
+
+    def record(self, name: str, k: int) -> Any:
+        """Return a row of the table `name` of f or w, by the names of its fields."""
+        row, fields = self.row(m.NAMED[name], k), m.row_fields(name)
+        return _record(name)(*(row[at : at + prod(shape)] if shape else row[at] for at, shape in fields.values()))
 
     def stretch(self, index: int, first: int, count: int) -> list[Cell]:
         """Return numbers of a stretch of w."""

@@ -21,13 +21,14 @@ from flexclear.dynamics.compile import functions
 from flexclear.dynamics.compile.folder import writable
 from flexclear.dynamics.routines.calls import CallList
 from flexclear.dynamics.routines.emission import interpreter_text, routine_text
+from flexclear.dynamics.specialise import topology as topologies
 from flexclear.workflow.fingerprint import TREE, library_version, sources_of
 
 DYNAMICS = "flexclear.dynamics"
 #: modules that make code of a tape; packages and further modules that make lists
 EMITTING = ("routines.emission", "specialise.code")
 PACKAGES = ("routines", "mechanics", "contact.form", "contact.friction")
-LISTING = (*EMITTING, "memory", "vectors", *(f"specialise.{name}" for name in ("plain", "tape", "trace")))
+LISTING = (*EMITTING, "memory", "vectors", *(f"specialise.{name}" for name in ("plain", "tape", "topology", "trace")))
 LISTING += ("effects.bushings.bushing", "effects.joint_friction.bearings", "effects.wear.contact")
 LISTING += tuple(
     f"{package}.{path.stem}"
@@ -40,8 +41,9 @@ LISTING += tuple(
 class LoadedList:
     """A list of calls as the interpreter reads it.
 
-    interpreter: its address.  codes: address per call.  offsets: of the runs of all calls.  begins: per call, the index
-    of its first one.  size: number of results.
+    interpreter: its address.  codes: address per call.  offsets: of the runs of all calls, in their stretches of f and
+    w where they have some (`specialise.topology`).  begins: per call, the index of its first one.  size: number of
+    results.
     """
 
     interpreter: int
@@ -50,9 +52,9 @@ class LoadedList:
     begins: np.ndarray
     size: int
 
-    def instance(self) -> ListInstance:
-        """Return the list with results of its own."""
-        return ListInstance(self)
+    def instance(self, h: np.ndarray) -> ListInstance:
+        """Return the list with results of its own; h: with the starts of its stretches in f and w."""
+        return ListInstance(self, h)
 
 
 #: lists of this process, by their files
@@ -62,9 +64,11 @@ loaded: dict[Path, LoadedList] = {}
 class ListInstance:
     """A list of calls with its results, for one engine. words: what the interpreter reads (`routines.emission`)."""
 
-    def __init__(self, loaded: LoadedList) -> None:
+    def __init__(self, loaded: LoadedList, h: np.ndarray) -> None:
         self.loaded, self.results = loaded, np.zeros(loaded.size)
-        self._starts = (loaded.offsets.ctypes.data + loaded.offsets.itemsize * loaded.begins).astype(np.int64)
+        stretch, inside = topologies.split(loaded.offsets)
+        self._offsets = (np.where(stretch >= 0, h[stretch], 0) + inside).astype(np.int32)
+        self._starts = (self._offsets.ctypes.data + self._offsets.itemsize * loaded.begins).astype(np.int64)
         tables = (loaded.codes, self._starts, self.results)
         self.words = np.array([len(loaded.codes), *(table.ctypes.data for table in tables)], dtype=np.int64)
 
@@ -110,7 +114,7 @@ def _table(calls: CallList) -> dict[str, list]:
 def _loaded(table: dict[str, list], at: dict[str, int]) -> LoadedList:
     addresses = np.array([at[name] for name in table["names"]], dtype=np.int64)
     begins = np.cumsum([0, *table["counts"]])[:-1]
-    offsets = np.array(table["offsets"], dtype=np.int32)
+    offsets = np.array(table["offsets"], dtype=np.int64)
     return LoadedList(int(addresses[0]), addresses[table["codes"]], offsets, begins, table["size"][0])
 
 

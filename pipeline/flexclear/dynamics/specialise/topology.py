@@ -48,8 +48,11 @@ def header(topology: Topology) -> list[int]:
     return h
 
 
-def split(index: int) -> tuple[int, int]:
-    """Return the header index of a work array, -1 for h, f, w or n itself, and the position in the array."""
+def split(index: Any) -> tuple[Any, Any]:
+    """Return the header index of a work array, -1 for h, f, w or n itself, and the position in the array.
+
+    index: an integer or an array of such.
+    """
     return (index >> STRETCH) - 1, index & ((1 << STRETCH) - 1)
 
 
