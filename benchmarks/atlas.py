@@ -25,12 +25,10 @@ from flexclear.scene.integrators import DEFAULT
 from flexclear.scene.load import compose, scene_of
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
-from flexclear.stages.graph import Graph
 from flexclear.stages.scenes import Workplace, bundles, open_workplace
 from flexclear.system.errors import FlexclearError, SolverError
 from flexclear.system.progress import silent
 from flexclear.workflow.progress import Monitor
-from flexclear.workflow.task import in_order
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -210,11 +208,8 @@ CLOSURE = 1e-9
 DEVIATION = 1e-2
 
 
-def modules(case: Case) -> set[str]:
-    """Return the modules that determine a case: its scene, the dynamics, the earlier stages, and the parts it names."""
-    tasks = in_order([Graph(scene(case.of), shown=False).simulate])
-    named = {name for task in tasks for name in task.roots()}
-    return {scene.__module__, "flexclear.dynamics", *named}
+#: code that determines an outcome besides the core's
+CODE = (scene.__module__, "flexclear.structure", "flexclear.dynamics")
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:

@@ -48,8 +48,8 @@ class Family:
     quick: name of the smallest case, where it takes less than 5 s warm.
     times: True when times are the subject. The log then keeps every measurement, with four digits, since further
     digits are noise; otherwise it keeps only the last measurement, with all digits.
-    modules: modules that determine a case's result. With it, a result is valid until a source that they import changes;
-    without it, a case is measured again at each request.
+    code: packages and modules whose code, besides the core's, determines results. With it, a result is valid until that
+    changes; without it, a case is measured again at each request.
     needs: an optional library, and the extra of this project that installs it.
     children: the family measures or limits child processes, which not every system can (`benchmarks.processes`).
     """
@@ -64,6 +64,6 @@ class Family:
     quick: str = ""
     settings: Mapping[str, int] = field(default_factory=dict)
     times: bool = True
-    modules: Callable[[Case], set[str]] | None = None
+    code: tuple[str, ...] = ()
     needs: tuple[str, str] | None = None
     children: bool = False

@@ -18,7 +18,7 @@ from typing import Any
 
 from benchmarks.family import FINISHED, Case, Family, Record
 from flexclear.artifacts.paths import results_root
-from flexclear.workflow.fingerprint import TREE, Sources, library_version
+from flexclear.workflow.fingerprint import CORE, TREE, library_version, sources_of
 
 FOLDER = Path(__file__).parent / "log"
 PACKAGES = ("flexclear", "numpy", "scipy", "numba", "exudyn", "pin", "mujoco")
@@ -106,14 +106,14 @@ class Memory:
     def recall(self, case: Case) -> list[Record] | None:
         """Return the records of a case, or None when no valid ones exist."""
         line = self.known.get(_identity(case))
-        if line is None or line["sources"] == sources(self.spec, case):
+        if line is None or line["sources"] == sources(self.spec):
             return line and line["records"]
         good = all(record.get("verdict", FINISHED) == FINISHED for record in line["records"])
         return line["records"] if self.trusting and good else None
 
     def learn(self, case: Case, records: list[Record]) -> None:
         """Store the records of a case immediately."""
-        line = {"of": _identity(case), "sources": sources(self.spec, case), "records": records}
+        line = {"of": _identity(case), "sources": sources(self.spec), "records": records}
         self.known[line["of"]] = line
         self.file.parent.mkdir(parents=True, exist_ok=True)
         with self.file.open("a", encoding="utf-8", newline="\n") as file:
@@ -121,7 +121,7 @@ class Memory:
 
     def forget(self, cases: list[Case]) -> None:
         """Drop the results of logged cases, unless the family's results stay valid until sources change."""
-        if self.spec.modules is None and self.file.exists():
+        if not self.spec.code and self.file.exists():
             for case in cases:
                 self.known.pop(_identity(case), None)
             self.file.write_text(
@@ -134,24 +134,14 @@ def _identity(case: Case) -> str:
     return f"{case!r} on {now.cpu} with {now.versions}"
 
 
-def sources(spec: Family, case: Case) -> str:
-    """Return the digest of the sources that measuring a case reaches."""
-    own = spec.measure.__module__
-    if spec.modules is None:
-        return _digest(frozenset({own}))
-    module = _tree().module(own)
-    return f"{module and module.digest} {_digest(frozenset(spec.modules(case)))}"
+def sources(spec: Family) -> str:
+    """Return the digest of the code by which a family measures, and of what it measures."""
+    return _digest((*spec.code, *(CORE if spec.code else ()), spec.measure.__module__))
 
 
 @cache
-def _digest(roots: frozenset[str]) -> str:
-    found = sorted((name, module.digest) for name, module in _tree().closure(roots).items())
-    return hashlib.sha256(json.dumps(found).encode()).hexdigest()
-
-
-@cache
-def _tree() -> Sources:
-    return Sources(TREE)
+def _digest(names: tuple[str, ...]) -> str:
+    return hashlib.sha256(json.dumps(sources_of(TREE).code(names), sort_keys=True).encode()).hexdigest()
 
 
 @cache

@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,10 @@ NOTHING = "Not measured."
 
 def named(name: str) -> Family:
     """Return the family with this name; raise InputError, which lists the known names, for any other."""
-    return lookup(families.__name__, name, where="python -m benchmarks")
+    of = lookup(families.NAMES, name, kind="benchmark", where="python -m benchmarks")
+    module, _, attribute = of.partition(":")
+    found: Family = getattr(import_module(f"{families.__name__}.{module}"), attribute)
+    return found
 
 
 def of_page(page: str) -> dict[str, Family]:

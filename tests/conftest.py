@@ -17,7 +17,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 #: files of few tests that take long
 LONG = (
     *("stages/test_workflow.py", "stages/test_sweep_workers.py", "stages/test_gallery.py", "stages/test_plan.py"),
-    *("architecture/test_quick_commands.py", "architecture/test_extending.py", "stages/test_fingerprint.py"),
+    *("architecture/test_quick_commands.py", "architecture/test_extending.py"),
     *("analytic/test_accuracy.py", "analytic/test_horizon_ensembles.py"),
     *("stages/test_same_bytes.py", "stages/test_page_examples.py"),
 )

@@ -35,24 +35,22 @@ def printed(code: str, *arguments: str | Path, **options: str) -> str:
 def copied(folder: Path, *more: str) -> Path:
     """A folder with a copy of the program's sources, and of more folders of the project.
 
-    Its results begin with what each source imports: to parse all of them takes longer than most of what is tested.
+    Its results begin with the digest of each source: to parse all of them takes longer than most of what is tested.
     """
     for name in (*PACKAGES, *more):
         ignored = shutil.ignore_patterns("*.pyc.*")  # half written
         shutil.copytree(ROOT / name, folder / name, ignore=ignored)
     shutil.copy(ROOT / "pyproject.toml", folder)
-    memo = folder / "results" / "cache" / "imports.json"
+    memo = folder / "results" / "cache" / "code.json"
     memo.parent.mkdir(parents=True)
-    memo.write_bytes(_imports())
+    memo.write_bytes(_digests())
     return folder
 
 
 @cache
-def _imports() -> bytes:
-    """The memo of imports of all stages, as commands leave it."""
-    stages = sorted((TREE / "flexclear" / "stages").rglob("*.py"))
-    names = [".".join(path.relative_to(TREE).with_suffix("").parts) for path in stages]
+def _digests() -> bytes:
+    """The memo of digests of all packages, as commands leave it."""
     with TemporaryDirectory() as folder:
-        memo = Path(folder) / "imports.json"
-        Sources(TREE, memo).closure([name.removesuffix(".__init__") for name in names])
+        memo = Path(folder) / "code.json"
+        Sources(TREE, memo).code(["flexclear", "papers"])
         return memo.read_bytes()

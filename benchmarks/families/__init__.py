@@ -1,6 +1,5 @@
 """Families of benchmarks: name -> module and attribute that declares it (`benchmarks.family.Family`)."""
 
-KIND = "benchmark"
 NAMES = {
     "evaluation": "runs:EVALUATION",
     "runs": "runs:FAMILY",

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +14,7 @@ from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Record, ea
 from benchmarks.page import Columns, table
 from flexclear import dynamics
 from flexclear.dynamics import analyses
-from flexclear.dynamics.effects import RUNS
 from flexclear.scene.load import scene_of
-from flexclear.scene.registry import module_of
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import FlexclearError
 from flexclear.system.progress import silent
@@ -431,13 +428,6 @@ def show(records: list[Record]) -> str:
     )
 
 
-def modules(case: Case) -> set[str]:
-    """Return the modules that determine a case: its scene and the dynamics."""
-    del case
-    ways = {module_of(RUNS, name) for name in import_module(RUNS).NAMES}  # scenes request them by these names
-    return {__name__, "flexclear.dynamics", *ways}
-
-
 FAMILY = Family(
     what="classes of hard cases, each with a closed form, a second computation or a refusal",
     takes="2 min",
@@ -446,5 +436,5 @@ FAMILY = Family(
     measure=each(lambda case: [examined(case.name)]),
     show=show,
     times=False,
-    modules=modules,
+    code=("flexclear.dynamics",),
 )

@@ -270,6 +270,6 @@ FAMILY = Family(
     files=files,
     settings={"seed": 20190310, "random": 200},
     times=False,
-    modules=atlas.modules,
+    code=atlas.CODE,
     children=True,
 )

@@ -105,7 +105,7 @@ def task(case: Case) -> Task:
         run=f"{module}:{'members' if case.clearance and case.condition != RIGID else 'single'}",
         params=simulation.params(given, ensemble=case.clearance),
         inputs={f"bundle/{body}": made for body, made in graph.bundle.items()},
-        modules=(module, *simulation.modules(given)),
+        code=simulation.CODE,
         folder="",
         part=f"{case.place} mm, {label(case.condition, case.count)}" + (", clearance" if case.clearance else ""),
     )

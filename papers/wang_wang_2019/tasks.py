@@ -9,7 +9,6 @@ from typing import Any
 
 import flexclear as fc
 from flexclear.artifacts.store import Record
-from flexclear.scene.registry import module_of
 from flexclear.stages import derived_series, kernels, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, check
@@ -18,6 +17,8 @@ from flexclear.workflow.task import Task
 from papers import PROJECT
 from papers.wang_wang_2019 import DOCUMENTS, figures, timing
 
+#: code that decides figures, tables and the page
+CODE = (*(f"flexclear.{name}" for name in ("dynamics", "structure", "post", "study")), __package__)
 #: files with parts that the page shows, below the folder of the sources: pages, their pictures, variants of scenes
 PAGES = [pattern for name in DOCUMENTS for pattern in (f"docs/{name}.md", f"docs/{name}/*.png")]
 PAGES += ["scenes/sps4/variants/*.toml"]
@@ -62,7 +63,7 @@ class Scenes:
             params={g.scene.name: simulation.params(g.scene) for g in graphs},
             inputs={f"{g.scene.name}:{name}": task for g in graphs for name, task in g.bodies().items()}
             | _paper_kernels(graphs),
-            modules=tuple(sorted({name for g in graphs for name in simulation.modules(g.scene)})),
+            code=("flexclear.stages.kernels", *simulation.CODE),
             folder=f"runs/{family}",
             names={"nc": "timing.nc"},
         )
@@ -102,7 +103,7 @@ def figure_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
             run=f"{figures.__name__}:draw",
             params={"figure": name},
             inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
-            modules=(module_of(figures.__name__, name),),
+            code=CODE,
             files={file: PROJECT / file for file in entry["files"]},
             folder="tables" if name.startswith("table") else "figures",
         )
@@ -119,7 +120,7 @@ def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
         part="index",
         run=f"{figures.__name__}:index",
         params={"names": names},
-        modules=tuple(dict.fromkeys(module_of(figures.__name__, name) for name in names)),
+        code=CODE,
     )
     (made,) = workplace.made(task)
     index: dict[str, dict[str, Any]] = json.loads(made.read("index.json"))
@@ -133,6 +134,7 @@ def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list
         scene="report",
         part="page",
         run="papers.wang_wang_2019.report:run",
+        code=CODE,
         params={
             "results": str(workplace.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},

@@ -398,15 +398,9 @@ def press(**changes: Any) -> Scene:
     return edited(load_scene(TREE / "scenes" / "gallery" / "shear_pin.toml"), changes)
 
 
-def test_only_scenes_with_events_reach_their_modules() -> None:
-    """A part that an event brings in is in the key of the run."""
-    with_events, without = press(), press(event={})
-    packages = [[n for n in simulation.modules(one) if ".dynamics.events" in n] for one in (with_events, without)]
-    assert packages == [["flexclear.dynamics.events.phases"], []]
-    wave = {"law": {"type": "harmonic", "amplitude": [0.1], "frequency": [3.0]}}
-    switched = press(event={"e": {"at": 0.1, "switch": "drive.motor", "to": wave}})
-    assert "flexclear.dynamics.drives.harmonic" in simulation.modules(switched)
-    assert simulation.params(with_events) != simulation.params(press(**{"event.break.at": "abs(pin.force) > 41 N m"}))
+def test_events_are_parameters_of_a_run() -> None:
+    assert not simulation.params(press(event={}))["scene"].get("event")
+    assert simulation.params(press()) != simulation.params(press(**{"event.break.at": "abs(pin.force) > 41 N m"}))
 
 
 def test_points_of_sweeps_go_over_events() -> None:

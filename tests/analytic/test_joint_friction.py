@@ -13,8 +13,8 @@ import xarray as xr
 from scipy.optimize import brentq
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.joint_friction.bearings import BALL
-from flexclear.dynamics.effects.joint_friction.equations import eliminate, find_loads
+from flexclear.dynamics.effects.joint_friction import BALL
+from flexclear.dynamics.equations.joint_friction import eliminate, find_loads
 from flexclear.dynamics.specialise import dual
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError

@@ -1,71 +1,31 @@
-"""An effect that a scene does not have is not there: not imported, not compiled, not a key of the machine code."""
+"""An effect that a scene does not have is not there: not compiled, and no key of the machine code."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Set
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from flexclear.dynamics import loads
-from flexclear.dynamics.compile import functions, reach
-from flexclear.dynamics.compile.reach import imported
-from flexclear.dynamics.compile.sources import (
-    DESCRIBED,
-    batched,
-    kernels,
-    sources,
-    specialised,
-    tangent,
-)
-from flexclear.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
-from flexclear.dynamics.effects.declared import EFFECTS as DECLARED
-from flexclear.dynamics.effects.effect import PACKAGE
+from flexclear.dynamics.compile import functions
+from flexclear.dynamics.compile.sources import kernels, sources, specialised
+from flexclear.dynamics.contact import form as contact_forms
+from flexclear.dynamics.effects import CHAIN, FORMS, WHOLE, Parts, Scheme, most_parts, scheme_of
+from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.load import compose, load_scene
-from flexclear.scene.registry import module_of
 from flexclear.scene.schema import Scene
-from flexclear.workflow import fingerprint
 from tests.analytic.mechanism_runs import bundles
 from tests.processes import printed
 
-DYNAMICS = "flexclear.dynamics"
-CONTACT = (
-    "flexclear.dynamics.contact",
-    "flexclear.dynamics.contact.surfaces.clearance_spherical",
-    "flexclear.dynamics.integrate.contact_events",
-    "flexclear.dynamics.integrate.contact_phases",
-)
-APPLIED = (
-    "flexclear.dynamics.loads.fields",
-    "flexclear.dynamics.loads.composing",
-    "flexclear.dynamics.drives.oscillation",
-    "flexclear.dynamics.starts",
-    "flexclear.dynamics.linear",
-)
-BODIES = "flexclear.dynamics.bodies"
-FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.interface", f"{BODIES}.ports", "flexclear.structure")
-#: ways over singular poses and out of them, which no run takes that meets none
-POSES = "flexclear.dynamics.run.singular_poses"
-SINGULAR = tuple(f"{POSES}.{name}" for name in ("collocation", "passing", "beginning"))
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
 
-#: runs a scene for a moment, then says which modules of the project it took
-RUN = """
-import sys
-from dataclasses import replace
-from flexclear import dynamics
-from flexclear.scene.load import load_scene
-dynamics.simulate(load_scene(sys.argv[1], {"time.end": "0.2 ms"}), {}, lambda share, text: None)
-print(*[name for name in sys.modules if name.startswith("flexclear.")])
-"""
 #: reads a scene, then says which models of its parts have a schema of their own
 BUILT = """
 import sys
@@ -81,59 +41,6 @@ print(len(found), *[model.__name__ for model in found if model.__pydantic_comple
 
 def path_of(root: Path, scene: str) -> Path:
     return root / "scenes" / f"{scene}.toml"
-
-
-@cache
-def imported_by_a_run(root: Path, scene: str) -> frozenset[str]:
-    return frozenset(printed(RUN, path_of(root, scene)).split())
-
-
-def below(names: Set[str], families: tuple[str, ...]) -> set[str]:
-    return {n for n in names if any(n == f or n.startswith(f + ".") for f in families)}
-
-
-def test_a_run_of_an_ideal_scene_imports_no_contact_and_no_flexible_body(root: Path) -> None:
-    names = imported_by_a_run(root, IDEAL)
-    assert "flexclear.dynamics.joints.spherical" in names
-    assert below(names, (*CONTACT, *FLEXIBLE, *APPLIED, *SINGULAR)) == set()
-
-
-def code_of_effects(names: Set[str]) -> set[str]:
-    """Modules of effects other than declarations."""
-    return {n.removeprefix(f"{PACKAGE}.") for n in names if re.fullmatch(rf"{PACKAGE}\.\w+\.(?!effect$)\w+", n)}
-
-
-def test_declarations_of_effects_are_read_without_their_code() -> None:
-    text = "import sys; from flexclear.dynamics import effects; print(*sys.modules)"
-    names = set(printed(text).split())
-    assert {f"{PACKAGE}.{effect.name}.effect" for effect in DECLARED} <= names
-    assert code_of_effects(names) == set()
-    assert below(names, ("numba", f"{DYNAMICS}.kernels", f"{DYNAMICS}.memory")) == set()
-
-
-def test_a_run_imports_the_code_of_no_effect_that_its_scene_lacks(root: Path) -> None:
-    """But for what contacts and closures may be: ends of stops, and gears."""
-    kinds = {"stops.model", "gears.model"}
-    assert code_of_effects(imported_by_a_run(root, IDEAL)) == kinds
-    assert code_of_effects(imported_by_a_run(root, "checks/bushing")) == {*kinds, "bushings.bushing", "bushings.run"}
-
-
-def test_every_function_that_a_declaration_names_is_there() -> None:
-    for effect in DECLARED:
-        given = [getattr(effect, field.name) for field in fields(effect)]
-        functions = [one for one in [*given, *effect.records.values()] if isinstance(one, str) and ":" in one]
-        assert all(callable(effect.load(function)) for function in functions)
-        assert {f"{PACKAGE}.{effect.name}.{one.partition(':')[0]}" for one in functions} == effect.modules
-
-
-def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
-    """Also shows that the test above would notice."""
-    names = imported_by_a_run(root, CSJ)
-    laws = {n for n in below(names, CONTACT) if re.search(r"\.(normal|friction)\.\w+$", n)}
-    normal = {"flexclear.dynamics.contact.normal.lankarani_nikravesh"}
-    friction = "flexclear.dynamics.contact.friction"
-    assert laws == normal | {f"{friction}.{n}" for n in ("law", "modified_coulomb")}
-    assert below(names, (*FLEXIBLE, *SINGULAR)) == set()
 
 
 def test_parts_are_built_with_their_scene_and_not_one_by_one(root: Path) -> None:
@@ -155,27 +62,22 @@ def parts(path: Path) -> Parts:
     return parts_of(load_scene(path))
 
 
-def reached(texts: dict[str, str]) -> set[str]:
-    """Modules of this tower that the machine code depends on."""
-    return {name for text in texts.values() for name in reach.reached(text)}
-
-
-#: effect -> word that its generated source must have, modules it must reach
+#: effect -> word that its generated source must have
 EFFECTS = {
-    "contact": ("clearance_spherical", "flexclear.dynamics.contact.surfaces.clearance_spherical"),
-    "normal law": ("import hysteretic", "flexclear.dynamics.contact.form.hysteretic"),
-    "friction": ("modified_coulomb", "flexclear.dynamics.contact.friction.modified_coulomb"),
-    "flexible bodies": ("flexible_bodies", "flexclear.dynamics.bodies.flexible"),
-    "closures": ("closures=", "flexclear.dynamics.equations.closures"),
-    "singular poses": ("poses=singular_step", "flexclear.dynamics.integrate.singular_step"),
-    "couplings": ("make_coupled_closing", "flexclear.dynamics.effects.gears.equations"),
-    "stops": ("make_stops", "flexclear.dynamics.effects.stops.contact"),
-    "stiffening": ("flexible_bodies(bodies)", "flexclear.dynamics.effects.stiffening.bodies"),
-    "loads": ("make_loads", "flexclear.dynamics.loads.composing"),
-    "harmonics": ("import oscillate", "flexclear.dynamics.drives.oscillation"),
-    "joint friction": ("make_joint_friction", "flexclear.dynamics.effects.joint_friction.equations"),
-    "wear": ("import wearing", "flexclear.dynamics.effects.wear.contact"),
-    "guards": ("integrate.guards import", "flexclear.dynamics.integrate.guards"),
+    "contact": 'SURFACES["clearance-spherical"]',
+    "normal law": 'FORMS["hysteretic"]',
+    "friction": 'FRICTION_LAWS["',
+    "flexible bodies": "flexible_bodies",
+    "closures": "closures=",
+    "singular poses": "poses=singular_step",
+    "couplings": "make_coupled_closing",
+    "stops": "make_stops",
+    "stiffening": "flexible_bodies(stiffening)",
+    "loads": "make_loads",
+    "harmonics": "import oscillate",
+    "joint friction": "make_joint_friction",
+    "wear": "import wearing",
+    "guards": "integrate.guards import",
 }
 SPRING = ("spring-damper",)
 SMOOTH = {"surfaces": ("clearance-spherical",), "forms": ("hysteretic",)}
@@ -221,46 +123,56 @@ def generated(parts: Parts, scheme: Scheme = SCHEME) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str) -> None:
+def test_the_entry_names_the_effects_present_and_no_other(case: str) -> None:
     found, present = CASES[case]
-    texts = generated(found)
-    modules, source = reached(texts), "".join(texts.values())
+    source = "".join(generated(found).values())
     if "closures" in present:  # loops alone have singular poses
         present = present | {"singular poses"}
-    for effect, (word, module) in EFFECTS.items():
+    for effect, word in EFFECTS.items():
         assert (word in source) == (effect in present), effect
-        assert (module in modules) == (effect in present), effect
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
-    """An edit of a part that a scene does not use leaves its machine code alone."""
-    found, present = CASES[case]
-    modules = reached(generated(found))
-    requested = {module_of(JOINTS, n) for n in found.joints}
-    requested.add("flexclear.dynamics.joints.coordinate")  # with which every joint names its freedoms
-    assert below(modules, ("flexclear.dynamics.joints",)) == requested
-    if not {"contact", "stops", "joint friction"} & present:
-        assert below(modules, CONTACT) == set()
-    if "flexible bodies" not in present:
-        assert below(modules, FLEXIBLE) == set()
-    acting = {module_of(LOADS, n) for n in found.loads}
-    kinds_of_loads = {module_of(LOADS, n) for n in loads.NAMES}
-    assert modules & kinds_of_loads == acting
+def test_absent_laws_joints_and_loads_are_not_composed(case: str) -> None:
+    found, _ = CASES[case]
+    source = "".join(generated(found).values())
+    for table, names in {"JOINTS": found.joints, "SURFACES": found.surfaces, "LOADS": found.loads}.items():
+        assert set(re.findall(rf'{table}\["([\w-]+)"\]', source)) == set(names)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_lines_of_generated_files_tell_all_that_they_import(case: str) -> None:
-    """As Python's own parser finds it."""
-    parts, _ = CASES[case]
-    alone = specialised(parts, ((1, 2),)), specialised(parts, (), DESCRIBED), batched(parts, (), 2), tangent(parts, ())
-    for text in (*generated(parts).values(), *alone):
-        assert imported(text) == fingerprint.imported(text.encode(), "entry", package=False)[0]
+def test_declarations_of_effects_are_read_without_what_compiles() -> None:
+    """Light commands read them."""
+    names = set(printed("import sys; from flexclear.dynamics import effects; print(*sys.modules)").split())
+    assert not names & {"numba", "numpy", "flexclear.dynamics.kernels", "flexclear.dynamics.memory"}
 
 
-def test_frictionless_clearance_reaches_no_friction_law() -> None:
-    modules = reached(generated(CASES["smooth clearance"][0]))
-    assert below(modules, ("flexclear.dynamics.contact.friction",)) == set()
+def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
+    """The list of joints that stay one link is right, and the chain's parts are listed."""
+    for name, part in JOINTS.items():
+        if len(part.COORDINATES) > 1:
+            assert name not in WHOLE
+            assert {coordinate.part for coordinate in part.COORDINATES} <= set(CHAIN)
+
+
+def test_all_forms_of_normal_laws_may_be_composed() -> None:
+    assert set(FORMS) == set(contact_forms.FORMS)
+
+
+#: scenes whose bodies need no mesh
+RIGID = [path for path in sorted(Path("scenes").rglob("*.toml")) if path.parent.name in ("checks", "gallery", "sps4")]
+
+
+def test_only_scenes_whose_joints_make_loops_have_closures() -> None:
+    """What the scene says of it holds whatever tree is taken, and often says no more than is there."""
+    found = []
+    for path in RIGID:
+        scene = load_scene(path)
+        if not scene.recipes():
+            found.append((parts_of(scene).closures, most_parts(scene).closures))
+    assert len(found) > 30
+    assert (True, False) not in found
+    assert (False, False) in found
+    assert (True, True) in found
 
 
 # What the machine code is keyed by ----------------------------------------------------------------------------------
@@ -268,16 +180,6 @@ def test_frictionless_clearance_reaches_no_friction_law() -> None:
 
 def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
     return {name: functions.digest(text) for name, text in generated(found, scheme).items()}
-
-
-def test_the_tables_of_all_effects_are_part_of_the_key() -> None:
-    """They decide where kernels find the others: code of another map of the memory must not be taken."""
-    assert {f"{PACKAGE}.{effect.name}.effect" for effect in DECLARED} <= reached(sources(CASES["tree"][0], SCHEME))
-
-
-def test_the_numbers_of_event_kinds_are_part_of_the_key() -> None:
-    """Kernels have them compiled in, and datasets hold them: code of another numbering must not be taken."""
-    assert "flexclear.scene.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
 
 
 def digest(scene: Scene) -> str:

@@ -1,61 +1,46 @@
-"""A scene reaches and compiles its own integrator and stepping, and no other; numbers of the solver are no code."""
+"""A scene compiles its own integrator and stepping, and no other; numbers of the solver are no code."""
 
+import re
 from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
-from flexclear.dynamics.compile import reach
 from flexclear.dynamics.compile.sources import sources
 from flexclear.dynamics.effects import Parts, Scheme, scheme_of
 from flexclear.dynamics.equations import composite
-from flexclear.dynamics.integrate import NAMES
+from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.integrate.method import keep_nothing
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.load import load_scene
-from flexclear.scene.registry import lookup
 from flexclear.scene.solver import Solver
 
-PACKAGE = "flexclear.dynamics.integrate"
 PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
-#: modules of one integrator, reached by those that name it only
-PRIVATE = {
-    "dop853": {"dop853", "runge_kutta"},
-    "dopri5": {"dopri5", "runge_kutta"},
-    "rk4": {"rk4", "runge_kutta", "hermite"},
-    "adams-bashforth-moulton": {"adams", "rk4", "runge_kutta", "hermite"},
-    "generalized-alpha": {"generalized_alpha", "newton", "hermite"},
-    "radau": {"radau", "newton", "hermite"},
-    "exponential": {"exponential", "modal_basis", "phi_functions", "newton"},
-}
-STEPPING = {"adaptive", "fixed"}
 
 
-def reached(scheme: Scheme) -> set[str]:
-    """Modules of the family that the machine code of a scheme depends on."""
-    modules = {name for text in sources(PARTS, scheme).values() for name in reach.reached(text)}
-    return {name.removeprefix(f"{PACKAGE}.") for name in modules if name.startswith(f"{PACKAGE}.")}
+def composed(scheme: Scheme) -> str:
+    """Generated source of steps."""
+    return sources(PARTS, scheme)["advance"]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_an_integrator_reaches_no_other(name: str) -> None:
-    every = set().union(*PRIVATE.values())
-    assert reached(Scheme(name)) & every == PRIVATE[name]
+@pytest.mark.parametrize("name", METHODS)
+def test_steps_compose_their_own_method_and_no_other(name: str) -> None:
+    assert re.findall(r'METHODS\["([\w-]+)"\]', composed(Scheme(name))) == [name]
 
 
 def test_chosen_and_fixed_steps_are_different_code() -> None:
-    assert reached(Scheme("dop853")) & STEPPING == {"adaptive"}
-    assert reached(Scheme("dop853", fixed=True)) & STEPPING == {"fixed"}
+    assert "stepping=adaptive" in composed(Scheme("dop853"))
+    assert "stepping=fixed" in composed(Scheme("dop853", fixed=True))
 
 
 def test_events_at_step_ends_are_compiled_when_asked_for() -> None:
-    assert "step_end_events" not in reached(Scheme("rk4", fixed=True))
-    assert "step_end_events" in reached(Scheme("rk4", fixed=True, located=False))
+    assert "AT_STEP_ENDS" not in composed(Scheme("rk4", fixed=True))
+    assert "AT_STEP_ENDS" in composed(Scheme("rk4", fixed=True, located=False))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", METHODS)
 def test_a_method_is_what_the_list_says(name: str) -> None:
-    method, traits = lookup(PACKAGE, name, where="test"), INTEGRATORS[name]
+    method, traits = METHODS[name], INTEGRATORS[name]
     assert method.traits is traits
     given = [lambda *_: None] * 2
     _, _, error, _, keep = method.make_kernels(*given, *([(given[0], composite)] if traits.reads_all else []))
@@ -71,7 +56,7 @@ def test_a_method_is_what_the_list_says(name: str) -> None:
 
 
 def test_scenes_and_family_know_the_same_names() -> None:
-    assert set(INTEGRATORS) == set(NAMES)
+    assert set(INTEGRATORS) == set(METHODS)
 
 
 def test_the_table_of_the_page_says_what_the_list_says(root: Path) -> None:

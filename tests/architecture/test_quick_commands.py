@@ -53,7 +53,7 @@ def stand_in(tasks: Iterable[Task], place: Workplace) -> dict[Task, Record]:
 def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A results folder in which everything that the report shows is up to date."""
     root = tmp_path_factory.mktemp("fresh")
-    place = Workplace(Store(root), Sources(TREE, root / "cache" / "imports.json"))
+    place = Workplace(Store(root), Sources(TREE, root / "cache" / "code.json"))
     scenes = report.Scenes()
     tasks = [*report.figure_tasks(place, scenes), *scenes.graph(report.HEADLINE).of("render").values()]
     records = stand_in(tasks, place)

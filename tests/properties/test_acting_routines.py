@@ -1,21 +1,25 @@
 """Routines of contacts, stops and loads compute what kernels do: of random mechanisms, in contact and out of it."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
+from flexclear.dynamics import loads as kinds_of_loads
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact import surfaces as kinds_of_surfaces
+from flexclear.dynamics.contact.friction import FRICTION_LAWS
+from flexclear.dynamics.contact.normal import NORMAL_LAWS
+from flexclear.dynamics.mechanics import loads as acting
+from flexclear.dynamics.mechanics import surfaces
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.trajectory import integrate
-from flexclear.scene.clearance import FRICTIONS, NORMALS
-from flexclear.scene.clearance import SURFACES as JOINTS_WITH_SURFACES
 from flexclear.scene.load import load_scene
-from flexclear.scene.loads import KINDS
-from flexclear.scene.registry import declared
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
@@ -27,9 +31,7 @@ from tests.properties.test_routines import ROUNDING, assert_alike, by_routines, 
 
 NUMBERS = range(24)
 #: by name, with keys that each demands
-NORMAL: dict[str, Table] = {
-    name: {"delivered_restitution": 0.7} for name in declared(NORMALS, key="law") if name != "hertz"
-}
+NORMAL: dict[str, Table] = {name: {"delivered_restitution": 0.7} for name in NORMAL_LAWS if name != "hertz"}
 NORMAL |= {
     "hertz": {},
     "kelvin-voigt": {"damping": 100.0, "stiffness": 1e7},
@@ -103,8 +105,8 @@ def loads(random: np.random.Generator, number: int, joints: Table) -> Table:
 def table(number: int) -> Table:
     """A tree of rods on joints, some with clearance, under loads; some joints have ends, some are driven."""
     random = np.random.default_rng([number, 9])
-    surfaces = list(SURFACES)
-    kinds = [IDEAL[random.integers(2)], *random.choice(IDEAL, size=4), *(surfaces[(number + k) % 4] for k in range(2))]
+    loose = [list(SURFACES)[(number + k) % 4] for k in range(2)]
+    kinds = [IDEAL[random.integers(2)], *random.choice(IDEAL, size=4), *loose]
     order = random.permutation(len(kinds))
     made = rods(8, tuple(str(kinds[k]) for k in order), int(random.integers(1, 4)))
     contacts = [joint for joint in made["joint"].values() if joint["type"] in SURFACES]
@@ -138,10 +140,10 @@ def pressed(number: int) -> Evaluated:
     random, off = np.random.default_rng([number, 10]), {"speeds": 0.3, "turns": 0.1, "internal": 1e-6}
     gap = evaluated(model, **off).table(m.TOUCH)["gap"].astype(float)
     depth = random.uniform(1e-6, 1e-4, size=len(gap))
-    numbers, surfaces = model.arrays.table(m.CONTACT_NUMBERS), model.arrays.size(m.N_SURFACES)
+    numbers, touching = model.arrays.table(m.CONTACT_NUMBERS), model.arrays.size(m.N_SURFACES)
     for c, (_, joint, *_) in enumerate(model.contacts):
         way = "radius" if joint.type == "ball-on-plane" else "clearance"
-        if c < surfaces:
+        if c < touching:
             numbers[way][c] += (gap + depth)[c] * (1.0 if way == "radius" else -1.0)
         else:
             numbers["shape"][c, 0] -= numbers["shape"][c, 1] * (gap + depth)[c]
@@ -170,13 +172,21 @@ def test_random_mechanisms_in_contact_move_as_by_kernels(number: int) -> None:
 
 def test_every_surface_law_and_load_is_tried() -> None:
     models = [pressed(number).model for number in NUMBERS]
-    assert set().union(*(model.parts.surfaces for model in models)) == set(JOINTS_WITH_SURFACES)
-    assert set().union(*(model.parts.frictions for model in models)) == set(declared(FRICTIONS, key="law"))
+    assert set().union(*(model.parts.surfaces for model in models)) == set(kinds_of_surfaces.SURFACES)
+    assert set().union(*(model.parts.frictions for model in models)) == set(FRICTION_LAWS)
     assert {contact.joint.normal.law for model in models for contact in model.contacts} == set(NORMAL)
     effects = {one.name for model in models for one in model.parts.present}
     assert effects == {"bushings", "controllers", "gears", "stops", "wear"}
     kinds = {load.partition(" ")[0] for model in models for load in model.parts.loads}
-    assert kinds == set(declared(KINDS)) - {"gravity"}
+    assert kinds == set(kinds_of_loads.LOADS)
+
+
+@pytest.mark.parametrize("table", [surfaces.SURFACES, acting.LOADS], ids=["surfaces", "loads"])
+def test_kernels_serve_parts_that_routines_lack(table: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    model = pressed(1).model
+    assert has_routines(model)
+    monkeypatch.delitem(table, next(name for name in table if name in (*model.parts.surfaces, *model.parts.loads)))
+    assert not has_routines(model)
 
 
 # Friction of ideal joints, gears --------------------------------------------------------------------------------------

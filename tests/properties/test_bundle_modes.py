@@ -52,7 +52,7 @@ def paper_rod() -> xr.Dataset:
 
 def test_no_reference_condition_is_left_out() -> None:
     """A condition added to the family has to appear in these tests; "given" bases are those of test_program_files."""
-    assert {name for name, _ in WHOLE} | WITH_MORE | {"given"} == set(reference.NAMES)
+    assert {name for name, _ in WHOLE} | WITH_MORE | {"given"} == set(reference.CONDITIONS)
 
 
 @pytest.mark.parametrize(

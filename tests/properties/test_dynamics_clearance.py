@@ -18,7 +18,6 @@ from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.parts import Joint
-from flexclear.scene.registry import lookup
 from flexclear.scene.schema import Scene
 from tests.properties.kernels import from_arrays, from_python
 
@@ -37,7 +36,7 @@ SURFACES: dict[str, dict[str, Any]] = {
 BODY = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "pose": {}, "frames": {"centre": {}}}
 #: one law of each form that is compiled
 FORMS = {"hertz": {}, "flores": {"restitution": 0.8, "exponent": 1.5}, "kelvin-voigt": {"damping": 100.0}}
-LAWS = [(n, f, "clearance-spherical") for n in FORMS for f in (None, *friction.NAMES)]
+LAWS = [(n, f, "clearance-spherical") for n in FORMS for f in (None, *friction.FRICTION_LAWS)]
 LAWS += [("flores", f, "clearance-revolute") for f in (None, "modified-coulomb", "lugre")]
 every_law = pytest.mark.parametrize("laws", LAWS, ids=lambda laws: "-".join(str(law) for law in laws))
 Laws = tuple[str, str | None, str]
@@ -65,9 +64,9 @@ def tables_of(laws: Laws) -> Model:
 
 @cache
 def kernel(laws: Laws) -> Any:
-    form = lookup(forms.__name__, tables_of(laws).laws[0].form, where="test")
-    surfaces = lookup(surfaces_of_joints.__name__, laws[2], where="test")
-    frictions = () if laws[1] is None else (lookup(friction.__name__, laws[1], where="test"),)
+    form = forms.FORMS[tables_of(laws).laws[0].form]
+    surfaces = surfaces_of_joints.SURFACES[laws[2]]
+    frictions = () if laws[1] is None else (friction.FRICTION_LAWS[laws[1]],)
     return from_arrays(forces.make_contacts((surfaces,), (form,), frictions))
 
 
@@ -192,7 +191,7 @@ def test_the_ledger_books_what_the_forces_do(laws: Laws, seed: int, depth: float
     """Power on both bodies = -(rate of the stored energy) - the two losses."""
     touch = Touch(laws, seed, depth, slip)
     law = tables_of(laws).laws[0]
-    form = lookup(forms.__name__, law.form, where="test")
+    form = forms.FORMS[law.form]
     elastic = float(from_python(form.force)(-touch.touch[m.TOUCH.gap], 0.0, 1.0, law.numbers)[0])
     stored = elastic * touch.touch[m.TOUCH.rate]
     size = np.abs(touch.wrench["ball"]).max() * slip * 20.0
@@ -246,7 +245,7 @@ class Sizes(NamedTuple):
 
 
 def test_every_kind_of_surfaces_is_tried_here() -> None:
-    assert set(SURFACES) == set(surfaces_of_joints.NAMES) == set(HALF_WIDTHS)
+    assert set(SURFACES) == set(surfaces_of_joints.SURFACES) == set(HALF_WIDTHS)
 
 
 def joint_of(kind: str, **more: Any) -> Any:
@@ -256,7 +255,7 @@ def joint_of(kind: str, **more: Any) -> Any:
 
 @every_kind
 def test_stiffness_and_half_width_are_those_of_hertz(kind: str) -> None:
-    module, (outer, inner) = lookup(surfaces_of_joints.__name__, kind, where="test"), joint_of_names(kind)
+    module, (outer, inner) = surfaces_of_joints.SURFACES[kind], joint_of_names(kind)
     joint = joint_of(kind, **{f"{outer}_material": SOFT, f"{inner}_material": HARD})
     assert module.contact_size(joint, DEPTH, FORCE) == pytest.approx(HALF_WIDTHS[kind], rel=1e-13)
     assert module.stiffness(joint, 1.5) == pytest.approx(STIFFNESSES[kind], rel=1e-13)
@@ -279,7 +278,7 @@ def test_the_normal_is_the_gradient_of_the_gap_and_the_rates_are_those_of_motion
     joint = joint_of(kind, normal={"law": "hertz", "stiffness": 1e9})
     sizes = Sizes(joint.clearance, joint.radius, joint.shape)
     R = rotation_vector_to_matrix(random.normal(size=3))
-    separation = from_python(lookup(surfaces_of_joints.__name__, kind, where="test").separation)
+    separation = from_python(surfaces_of_joints.SURFACES[kind].separation)
     v = R @ random.normal(size=3)
     p = R @ (random.choice([-1.0, 1.0], 3) * random.uniform(0.01, 0.06, 3))
 

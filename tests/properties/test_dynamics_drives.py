@@ -122,7 +122,7 @@ spans = st.tuples(st.just(0.0) | st.floats(1e-50, 1.0), st.floats(0.01, 1.0), si
 
 def test_every_drive_law_is_tried_here() -> None:
     # expressions become pieces of these laws: tests/analytic/test_expressions.py
-    assert set(LAWS) == set(drives.NAMES) - {"expression"}
+    assert set(LAWS) == set(drives.LAWS) - {"expression"}
 
 
 @every_law

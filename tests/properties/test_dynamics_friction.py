@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 
 from flexclear.dynamics.contact import friction
 from flexclear.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
-from flexclear.scene.registry import lookup, module_of
 from tests.properties.kernels import from_python
 from tests.properties.test_dynamics_drives import adams_step
 
@@ -39,16 +38,16 @@ def limit(law: Any) -> float:
 
 
 def part(law: Any) -> Any:
-    return lookup(friction.__name__, law.law, where="test")
+    return friction.FRICTION_LAWS[law.law]
 
 
 def coefficient(law: Any, speed: float) -> float:
-    kernel = import_module(module_of(friction.__name__, law.law)).coefficient
+    kernel = import_module(f"{friction.__name__}.{law.law.replace('-', '_')}").coefficient
     return float(from_python(kernel)(speed, part(law).parameters(law)))
 
 
 def test_every_friction_law_is_tried_here() -> None:
-    assert set(FRICTION) == set(friction.NAMES)
+    assert set(FRICTION) == set(friction.FRICTION_LAWS)
 
 
 @every_law

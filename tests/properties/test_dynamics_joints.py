@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from flexclear.dynamics import joints
 from flexclear.numerics.rotations import rotation_vector_to_quaternion, skew
-from flexclear.scene.registry import lookup
 from tests.properties.kernels import from_python
 
 #: places in a work space of the tests' own
@@ -18,7 +17,7 @@ AT_X, AT_U, AT_RATE, AT_S = 0, 7, 13, 20
 STEP = 1e-3
 #: fourth-order differences over STEP: angular rates of some rad/s give 3^5 (1e-3)^4 / 30 = 1e-11, rounding 1e-12
 DIFFERENCE = 1e-9
-every_joint = pytest.mark.parametrize("name", joints.NAMES)
+every_joint = pytest.mark.parametrize("name", joints.JOINTS)
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Motion:
 
 
 def declared(name: str) -> Any:
-    return lookup(joints.__name__, name, where="test")
+    return joints.JOINTS[name]
 
 
 def move(name: str, x: np.ndarray, u: np.ndarray, du: np.ndarray) -> Motion:
@@ -155,7 +154,7 @@ def test_rotations_are_rotations(name: str, seed: int) -> None:
     assert np.linalg.det(R) == pytest.approx(1.0, abs=2e-14)
 
 
-@pytest.mark.parametrize("name", [n for n in joints.NAMES if declared(n).POSITIONS.startswith("rrrr")])
+@pytest.mark.parametrize("name", [n for n in joints.JOINTS if declared(n).POSITIONS.startswith("rrrr")])
 @given(seed=st.integers(0, 2**32 - 1), norm=st.floats(0.5, 2.0))
 def test_quaternions_keep_their_norm_and_need_none(name: str, seed: int, norm: float) -> None:
     x, u, du = coordinates(name, seed)

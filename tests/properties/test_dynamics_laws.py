@@ -15,7 +15,6 @@ from flexclear.dynamics.contact import form as forms
 from flexclear.dynamics.contact import normal
 from flexclear.dynamics.contact.law import Numbers, Resolved
 from flexclear.scene.clearance import NormalLaw
-from flexclear.scene.registry import lookup
 from tests.properties.kernels import from_python
 
 Parameters = tuple[float, float, float, float]
@@ -60,14 +59,14 @@ class Law:
         asked = {} if self.restitution is None else {self.asked: self.restitution}
         exponent = {} if self.name == "kelvin-voigt" else {"exponent": self.exponent}
         given_law = normal_law(law=self.name, **exponent, **asked)
-        return lookup(normal.__name__, self.name, where="test")(given_law, self.stiffness, self.mass)
+        return normal.NORMAL_LAWS[self.name](given_law, self.stiffness, self.mass)
 
     @property
     def a(self) -> float:
         return NORMAL[self.name][0](float(self.restitution or 0.0))
 
     def parts(self, depth: float, rate: float, impact_rate: float) -> tuple[float, float]:
-        form = lookup(forms.__name__, self.resolved.form, where="test")
+        form = forms.FORMS[self.resolved.form]
         elastic, damping = from_python(form.force)(depth, rate, impact_rate, self.resolved.numbers)
         return float(elastic), float(damping)
 
@@ -75,7 +74,7 @@ class Law:
         return sum(self.parts(depth, rate, impact_rate))
 
     def stored(self, depth: float) -> float:
-        form = lookup(forms.__name__, self.resolved.form, where="test")
+        form = forms.FORMS[self.resolved.form]
         return float(from_python(form.stored)(depth, self.resolved.numbers))
 
 
@@ -97,16 +96,16 @@ def law(name: str, choice: int, stiffness: float, exponent: float) -> Law:
 
 
 def test_every_normal_law_is_tried_here() -> None:
-    assert set(NORMAL) == set(normal.NAMES)
+    assert set(NORMAL) == set(normal.NORMAL_LAWS)
 
 
-@pytest.mark.parametrize("form", forms.NAMES)
+@pytest.mark.parametrize("form", forms.FORMS)
 @given(stiffness=STIFF, exponent=EXPONENT, depth=st.floats(1e-9, 1e-3))
 def test_every_form_has_the_inverse_of_its_elastic_force(
     form: str, stiffness: float, exponent: float, depth: float
 ) -> None:
     numbers = Numbers(stiffness, 1.0 if form == "linear-damper" else exponent, 0.3)
-    elastic, _ = from_python(lookup(forms.__name__, form, where="test").force)(depth, 0.0, 1.0, numbers)
+    elastic, _ = from_python(forms.FORMS[form].force)(depth, 0.0, 1.0, numbers)
     found = Resolved(form, numbers, None, 1.0).depth(elastic)
     assert found == pytest.approx(depth, rel=1e-13)  # two powers, of logarithms up to 21 with rounding
     assert Resolved(form, numbers, None, 1.0).depth(0.0) == 0.0

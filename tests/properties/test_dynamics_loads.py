@@ -107,7 +107,7 @@ def run() -> xr.Dataset:
 def test_every_load_is_tried_here() -> None:
     # those by expressions: tests/analytic/test_expressions.py
     elsewhere = {"gravity", "joint-expression", "line-expression", "point-expression"}
-    assert {part["type"] for part in LOADS.values()} == set(loads.NAMES) - elsewhere
+    assert {part["type"] for part in LOADS.values()} == set(loads.LOADS) - elsewhere
 
 
 def test_the_energy_is_accounted_for() -> None:

@@ -14,7 +14,6 @@ from scipy.integrate import solve_ivp
 
 from flexclear.dynamics.contact import normal, restitution
 from flexclear.dynamics.contact.normal import kelvin_voigt
-from flexclear.scene.registry import lookup
 from tests.properties.test_dynamics_laws import NORMAL, Law, normal_law
 from tests.reference import contact_solutions as exact
 
@@ -184,7 +183,7 @@ def test_warning_where_a_law_does_not_deliver_what_it_is_asked_for(name: str) ->
 )
 def test_what_a_law_cannot_do_is_refused_in_words(law: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        lookup(normal.__name__, law["law"], where="test")(normal_law(**law), 1e9, 1.0)
+        normal.NORMAL_LAWS[law["law"]](normal_law(**law), 1e9, 1.0)
 
 
 def test_a_linear_damper_asks_for_a_mass_where_a_restitution_needs_one() -> None:

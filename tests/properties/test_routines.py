@@ -215,7 +215,7 @@ def test_dependent_rows_are_a_singular_pose() -> None:
 
 # Joints ---------------------------------------------------------------------------------------------------------------
 def test_every_joint_type_has_a_row() -> None:
-    assert set(JOINTS) == set(joints.NAMES)
+    assert set(JOINTS) == set(joints.JOINTS)
 
 
 def positions(kind: str, random: np.random.Generator, scale: float) -> np.ndarray:

@@ -47,7 +47,7 @@ def test_damage_is_reported_and_removed(store: Store, command: Command):
 def test_what_is_no_record_is_not_taken_for_a_damaged_one(store: Store, command: Command):
     """Memos of commands, and files of artifacts that end alike."""
     made = store.put("figures", "a" * 32, {"index.json": b"{}"}, {})
-    memo = store.root / "cache" / "imports.json"
+    memo = store.root / "cache" / "code.json"
     memo.write_bytes(checked({}))
     assert "1 artifacts, 0 faults, 0 files" in command("cache", "check").out
     command("cache", "prune")

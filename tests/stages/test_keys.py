@@ -6,7 +6,7 @@ import ast
 import datetime
 import json
 import re
-from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -14,23 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexclear.artifacts.disk import read_checked
-from flexclear.artifacts.store import Store
+from flexclear.dynamics.compile.functions import NO_KERNELS
 from flexclear.scene.load import load_scene
-from flexclear.stages import derived_series, rigid_body, simulation
+from flexclear.stages import derived_series, simulation
 from flexclear.stages.graph import Graph
 from flexclear.system.errors import InputError
-from flexclear.system.progress import silent
-from flexclear.workflow.encounters import meet, noted
-from flexclear.workflow.execute import execute, find, states
-from flexclear.workflow.fingerprint import (
-    TREE,
-    Sources,
-    code_digest,
-    imported,
-    parents,
-    source_file,
-    sources_of,
-)
+from flexclear.workflow import fingerprint
+from flexclear.workflow.fingerprint import TREE, Sources, code_digest, library_version, sources_of
 from flexclear.workflow.task import Task, facts, flatten, in_order, key, reasons
 from tests.processes import copied
 
@@ -72,50 +62,17 @@ def test_leaves_are_written_as_json_writes_them(leaf: object):
 
 
 def test_reasons_are_words():
-    old = {"parameter joint.A1.clearance": "0.0005", "module a.b": "1", "input mesh": "2", "library numpy": "2.0"}
-    new = {"parameter joint.A1.clearance": "0.0002", "module a.c": "1", "input mesh": "3", "library numpy": "2.1"}
+    old = {"parameter joint.A1.clearance": "0.0005", "code of a.b": "1", "input mesh": "2", "library numpy": "2.0"}
+    new = {"parameter joint.A1.clearance": "0.0002", "code of a.b": "2", "input mesh": "3", "library numpy": "2.1"}
     assert reasons(new, old) == [
+        "code of a.b changed",
         "input mesh changed",
         "library numpy: 2.0 -> 2.1",
-        "module a.b is no longer used",
-        "module a.c is new",
         "joint.A1.clearance: 0.0005 -> 0.0002",
     ]
     assert reasons(new, None) == ["never run"]
     assert reasons(old, old) == []
     assert reasons({}, {"input mesh": "2"}, frozenset({"mesh"})) == []
-
-
-def test_imports_are_collected_from_anywhere_in_a_module():
-    text = b"""
-import numpy as np
-from flexclear.scene import units
-from . import near
-from ..far import thing
-from typing import TYPE_CHECKING
-if TYPE_CHECKING:
-    import pandas
-else:
-    import scipy.sparse
-def f():
-    try:
-        import flexclear.commands.run
-    except ImportError:
-        match f:
-            case 1:
-                from xarray import Dataset
-"""
-    own, libraries = imported(text, "flexclear.post.module", package=False)
-    assert {
-        "flexclear.scene",
-        "flexclear.scene.units",
-        "flexclear.post.near",
-        "flexclear.far.thing",
-        "flexclear.commands.run",
-    } <= own
-    assert libraries == {"numpy", "scipy", "xarray"}
-    own, _ = imported(b"from .near import x", "flexclear.post", package=True)
-    assert own == {"flexclear.post.near", "flexclear.post.near.x"}
 
 
 def test_sources_are_parsed_while_other_threads_parse(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,22 +86,8 @@ def test_sources_are_parsed_while_other_threads_parse(monkeypatch: pytest.Monkey
         return parse(source)
 
     monkeypatch.setattr(ast, "parse", disturbed)
-    assert imported(b"import numpy", "flexclear.x", package=False) == (set(), {"numpy"})
+    assert fingerprint._examined(b"import numpy as np", True)[1] == ["numpy"]
     assert len(calls) == 3
-
-
-def test_a_closure_holds_every_file_that_its_modules_name(root: Path, sources: Sources):
-    """Whatever the search leaves out as the name of something in a module is no file."""
-    closure = sources.closure(["flexclear.stages.simulation", "papers.wang_wang_2019.figures.panels"])
-    named = {name for module in closure.values() for name in module.own} | {
-        n for name in closure for n in parents(name)
-    }
-    assert {name for name in named if source_file(root, name) is not None} <= closure.keys()
-
-
-def test_a_root_that_does_not_exist_is_an_error(root: Path):
-    with pytest.raises(LookupError, match=r"no module flexclear\.stages\.nowhere"):
-        Sources(root / "pipeline").closure(["flexclear.stages.nowhere"])
 
 
 def graph(root: Path, name: str) -> Graph:
@@ -179,7 +122,7 @@ def copy(tmp_path: Path) -> Path:
 
 def read_again(copy: Path) -> Sources:
     """Sources of a copy; only those that were edited are parsed."""
-    return Sources(copy / "pipeline", copy / "results" / "cache" / "imports.json")
+    return Sources(copy / "pipeline", copy / "results" / "cache" / "code.json")
 
 
 RERUN = {
@@ -246,30 +189,39 @@ def test_a_source_of_a_recipe_that_is_no_text_is_refused(copy: Path, sources: So
             keys(graph(copy, "sps4/far_cb"), sources)
 
 
-@pytest.fixture(scope="module")
-def known(root: Path, sources: Sources) -> dict[str, dict[str, str]]:
-    """Keys of some scenes."""
-    return {f"sps4/{name}": keys(graph(root, f"sps4/{name}"), sources) for name in ("ideal", "csj", "far_cb")}
-
-
-#: modules, and the scenes that reach them
-REACHED = {
-    "pipeline/flexclear/dynamics/contact/friction/modified_coulomb.py": {"sps4/csj"},
-    "pipeline/flexclear/dynamics/contact/normal/lankarani_nikravesh.py": {"sps4/csj"},
-    "pipeline/flexclear/dynamics/joints/turn_and_slide.py": {"sps4/ideal", "sps4/csj", "sps4/far_cb"},
-    "pipeline/flexclear/structure/modes/reference/held.py": {"sps4/far_cb"},
-    "pipeline/flexclear/dynamics/loads/gravity.py": set(),
+#: modules, and the first words of the tasks of a scene with clearance and flexible bodies that run again
+EDITED = {
+    "pipeline/flexclear/dynamics/contact/friction/modified_coulomb.py": {"simulate", "ensemble"},
+    "pipeline/flexclear/structure/modes/reference/held.py": {"mesh", "modes", "bundle"},
+    "pipeline/flexclear/post/single_run/series.py": {"post"},
+    "pipeline/flexclear/post/pages/page.css": {"post"},
+    "pipeline/flexclear/stages/simulation.py": {"simulate", "ensemble"},
+    "pipeline/flexclear/stages/reduction.py": {"bundle"},
+    "pipeline/flexclear/numerics/axes.py": {"mesh", "modes", "bundle", "simulate", "ensemble", "post"},
+    "pipeline/flexclear/commands/run.py": set(),
     "papers/wang_wang_2019/figures/panels.py": set(),
 }
 
 
-def test_editing_a_module_reruns_only_scenes_that_reach_it(root: Path, copy: Path, known: dict[str, dict[str, str]]):
-    for module, scenes in REACHED.items():
-        path = copy / module
+def own_code(root: Path, tree: Sources) -> dict[str, dict[str, str]]:
+    """Facts of each task but for its inputs."""
+    tasks = in_order(graph(root, "sps4/far_csj_cb").up_to("post"))
+    return {task.label: facts(task, {}, tree) for task in tasks}
+
+
+def test_editing_a_package_reruns_the_stages_on_it_and_says_so(root: Path, copy: Path, sources: Sources):
+    before = own_code(root, sources)
+    for file, stages in EDITED.items():
+        path = copy / file
         text = path.read_text()
-        path.write_text(text + "\nEDITED = 1\n")
-        edited = read_again(copy)
-        assert {n for n, before in known.items() if changed(before, keys(graph(root, n), edited))} == scenes, module
+        path.write_text(text + ("\nEDITED = 1\n" if file.endswith(".py") else "\np {}\n"))
+        after = own_code(root, read_again(copy))
+        stale = {label.split()[0] for label in before if before[label] != after[label]}
+        assert stale == stages, file
+        package = file.split("/")[2] if "stages" not in file else file.removeprefix("pipeline/flexclear/")[:-3]
+        for label in before:
+            said = {f"code of {package.replace('/', '.')} changed"} if label.split()[0] in stages else set()
+            assert set(reasons(after[label], before[label])) == said, label
         path.write_text(text)
 
 
@@ -308,58 +260,70 @@ def test_words_do_not_count_and_code_does(edit: str):
     assert (one == other) is (edit in REWORDED)
 
 
-#: words of code that runs, and code that only finds words
-WORDS = {
-    "pipeline/flexclear/system/platforms.py": ('"""', '"""More words. '),
-    "pipeline/flexclear/scene/registry.py": ('"""', '"""More words. '),
-    "pipeline/flexclear/scene/clearance.py": ("Young's modulus", "modulus of elasticity"),
-    "pipeline/flexclear/scene/validation_errors.py": ("\n\n\n", "\n\n\nEDITED = 1\n\n\n"),
-    "pipeline/flexclear/scene/citations.py": ("\n\n\n", "\n\n\nEDITED = 1\n\n\n"),
-}
+def test_another_word_runs_nothing_again(root: Path, copy: Path, sources: Sources):
+    for module in ("system/platforms", "scene/registry", "dynamics/kernels"):
+        path = copy / "pipeline" / "flexclear" / f"{module}.py"
+        path.write_text(path.read_text().replace('"""', '"""More words. ', 1) + "# and more\n")
+    assert own_code(root, read_again(copy)) == own_code(root, sources)
 
 
-def test_another_word_runs_nothing_again(root: Path, copy: Path, known: dict[str, dict[str, str]]):
-    for module, edit in WORDS.items():
-        path = copy / module
-        assert edit[0] in path.read_text()
-        path.write_text(path.read_text().replace(*edit, 1))
-    edited = read_again(copy)
-    assert not any(changed(before, keys(graph(root, name), edited)) for name, before in known.items())
+def test_an_edit_above_the_kernels_compiles_nothing(copy: Path):
+    """Code of runs and records, and all of other packages; an edit of a kernel does."""
+    edits = {"dynamics/run/ledger": False, "post/single_run/series": False, "dynamics/gauge": True}
+    for module, compiles in edits.items():
+        before = Sources(copy / "pipeline").digest("flexclear.dynamics", NO_KERNELS)
+        path = copy / "pipeline" / "flexclear" / f"{module}.py"
+        path.write_text(path.read_text() + "\nEDITED = 1\n")
+        after = Sources(copy / "pipeline").digest("flexclear.dynamics", NO_KERNELS)
+        assert (after != before) is compiles, module
 
 
-def test_the_memo_of_imports_notices_edits(copy: Path):
-    """Closures with and without the memo are the same before and after an edit."""
-    memo = copy / "imports.json"
-    roots = ["flexclear.stages.simulation"]
-    assert Sources(copy / "pipeline", memo).closure(roots) == Sources(copy / "pipeline").closure(roots)
+def test_the_memo_of_digests_notices_edits(copy: Path):
+    """Facts with and without the memo are the same before and after an edit."""
+    memo, names = copy / "code.json", ["flexclear.stages", "flexclear.system"]
+    assert Sources(copy / "pipeline", memo).code(names) == Sources(copy / "pipeline").code(names)
     assert memo.is_file()
     path = copy / "pipeline" / "flexclear" / "stages" / "simulation.py"
-    path.write_text(path.read_text() + "\nimport flexclear.numerics.rotations\nimport wave\nimport meshio\n")
-    edited = Sources(copy / "pipeline", memo).closure(roots)
-    assert edited == Sources(copy / "pipeline").closure(roots)
-    assert "meshio" in edited["flexclear.stages.simulation"].libraries
+    path.write_text(path.read_text() + "\nimport wave\nimport vtk\n")
+    edited = Sources(copy / "pipeline", memo).code(names)
+    assert edited == Sources(copy / "pipeline").code(names)
+    assert "library vtk" in edited
     memo.write_text("{ not json")
-    assert Sources(copy / "pipeline", memo).closure(roots) == edited
+    assert Sources(copy / "pipeline", memo).code(names) == edited
 
 
 def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """What it runs was loaded then; a memo that is begun later holds all of them all the same."""
-    roots, memo = ["flexclear.stages.simulation"], tmp_path / "imports.json"
-    known = sources_of(TREE).closure(roots)
+    names, memo = ["flexclear.stages.simulation", "flexclear.system"], tmp_path / "code.json"
+    known = sources_of(TREE).code(names)
     with monkeypatch.context() as patch:
-        patch.setattr(Sources, "_parse", lambda self, path, name: pytest.fail(f"{name} is read again"))
-        assert sources_of(TREE, memo).closure(roots) == known
-    assert {name: module.digest for name, module in known.items()} == {
-        name: digest for name, (_, digest, *_) in (read_checked(memo) or {}).items()
-    }
+        patch.setattr(fingerprint, "_examined", lambda *_: pytest.fail("a file is read again"))
+        assert sources_of(TREE, memo).code(names) == known
+    assert "flexclear/stages/simulation.py" in (read_checked(memo) or {})
+
+
+def test_a_module_that_does_not_exist_is_an_error(root: Path):
+    with pytest.raises(LookupError, match=r"no module flexclear\.stages\.nowhere"):
+        Sources(root / "pipeline").code(["flexclear.stages.nowhere"])
 
 
 def test_library_versions_count(sources: Sources):
-    beam = ("flexclear.structure.kinds.beam",)
-    found = facts(Task("s", "scene", "flexclear.stages.reduction:run", {}, "", modules=beam), {}, sources)
-    assert {"library numpy", "library skfem", "library xarray"} <= found.keys()
-    assert re.match(r"\d+\.\d+", found["library skfem"])
+    """Also where functions import them; locks, folders and the machine's resources change no result."""
+    found = facts(Task("s", "scene", "flexclear.stages.reduction:run", {}, code=("flexclear.structure",)), {}, sources)
+    assert {"library numpy", "library scipy", "library skfem", "library xarray"} <= found.keys()
+    assert not {f"library {name}" for name in ("filelock", "platformdirs", "psutil", "matplotlib")} & found.keys()
+    assert found["library scipy"] == version("scipy")
     assert key(found) != key({**found, "library skfem": "0.0"})
+
+
+def test_the_version_is_known_in_a_checkout_on_the_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """There the metadata of an editable installation lies next to the sources, as PKG-INFO."""
+    (tmp_path / "some_library.egg-info").mkdir()
+    (tmp_path / "some_library.egg-info" / "PKG-INFO").write_text(
+        "Metadata-Version: 2.4\nName: some_library\nVersion: 1.2\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert library_version("some_library") == "1.2"
 
 
 def test_a_scene_survives_the_way_through_its_parameters(root: Path):
@@ -385,53 +349,3 @@ def without_sources(node: object) -> object:
     if isinstance(node, dict):
         return {key: without_sources(value) for key, value in node.items() if key != "source"}
     return [without_sources(item) for item in node] if isinstance(node, (list, tuple)) else node
-
-
-@pytest.mark.parametrize("meets", [False, True])
-def test_code_for_what_a_run_has_not_met_does_not_count(
-    root: Path, copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, meets: bool
-) -> None:
-    """What was made without it stays valid when it is edited, and what was made with it does not."""
-    name = "flexclear.post.sections.chaos"
-
-    def run(params: object, inputs: object, progress: object) -> dict[str, bytes]:
-        if meets:
-            meet("chaos")
-        return {"nc": b"result"}
-
-    monkeypatch.setattr(rigid_body, "run", run)
-    store, sources = Store(tmp_path / "results"), Sources(root / "pipeline")
-    task = Task("s", "scene", "flexclear.stages.rigid_body:run", {}, "runs/scene", met={"chaos": (name,)})
-    record = execute(task, {}, store, sources, silent)
-    assert (f"module {name}" in record.facts) is meets
-    assert find(task, {}, store, sources) == record
-    path = copy / "pipeline" / "flexclear" / "post" / "sections" / "chaos.py"
-    path.write_text(path.read_text() + "\nEDITED = 1\n")
-    edited = read_again(copy)
-    assert find(task, {}, store, edited) == (None if meets else record)
-    (state,) = states([task], store, edited)
-    assert state.why == ((f"module {name} changed",) if meets else ())
-
-
-def test_what_several_tasks_meet_at_once_counts_for_each() -> None:
-    with noted() as one:
-        meet("first")
-        with noted() as other:
-            meet("second")
-        meet("third")
-    meet("last")
-    assert one == {"first", "second", "third"}
-    assert other == {"second"}
-
-
-def test_what_is_met_is_noted_while_other_threads_begin_and_end() -> None:
-    def met(name: str) -> list[bool]:
-        kept = []
-        for _ in range(2000):
-            with noted() as mine:
-                meet(name)
-            kept.append(name in mine)
-        return kept
-
-    with ThreadPoolExecutor(4) as pool:
-        assert all(all(one) for one in pool.map(met, "abcd"))

@@ -142,13 +142,6 @@ def test_outcomes_are_remembered_until_their_sources_change(tmp_path: Path, monk
     assert trusting.recall(bad) is None
 
 
-def test_an_outcome_depends_on_the_parts_of_its_scene_and_not_on_the_page():
-    """Editing a friction law leaves a case without friction alone; what only shows outcomes leaves all alone."""
-    rough, smooth = (atlas.modules(Case("friction", Parameters(friction=f))) for f in (0.1, 0.0))
-    assert {name for name in rough - smooth if "friction" in name}
-    assert not {name for name in rough if name.startswith(("flexclear.post", "benchmarks.families"))}
-
-
 def recorded(case: Case, **outcome: Any) -> Record:
     """A record of a case, with what the page looks at."""
     numbers = {"ledger": 1e-9, "closure": 1e-15, "deviation": None, "horizon_share": 1.0, "evaluations": 9}

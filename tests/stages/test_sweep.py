@@ -21,14 +21,10 @@ from flexclear.scene.load import load_scene
 from flexclear.scene.quantity import parse_recorded
 from flexclear.scene.sweep import read_sweep
 from flexclear.scene.units import udunits
-from flexclear.stages.simulation import modules
 from flexclear.stages.sweeps import sweep_plan
 from flexclear.study import sweep
 from flexclear.system.errors import InputError, ResourceError
 from flexclear.system.progress import silent
-from flexclear.workflow.fingerprint import Sources
-from flexclear.workflow.task import STORE
-from tests.processes import printed
 from tests.properties.mechanisms import simulated
 
 GRAVITY = 9.81
@@ -367,39 +363,3 @@ def test_the_example_of_a_sensitivity_has_shares_of_a_whole(root: Path, tmp_path
     assert (found["ST"] >= 0.0).all()
     example["figure"](found, tmp_path / "shares.png")
     assert (tmp_path / "shares.png").stat().st_size > 10_000
-
-
-#: runs one point in a fresh process and prints the own modules that it loaded
-LOADED = """
-import sys
-import numpy, xarray
-from flexclear.scene.load import load_scene
-from flexclear.scene.sweep import read_sweep
-from flexclear.stages.sweeps import sweep_plan
-from flexclear.stages.workplace import open_workplace
-table = {"scene": "x", "keep": ["pin.peak_force"], "vary": {"time.end": [1e-4]}}
-plan = sweep_plan.prepare(sweep_plan.plan(read_sweep(table, "x"), load_scene(sys.argv[1]), "x"), open_workplace())
-import pickle
-(family,), (job,) = plan.families, plan.jobs
-before = set(sys.modules)
-for name in list(before):
-    if name.startswith("flexclear.dynamics"):
-        del sys.modules[name]
-before = set(sys.modules)
-from flexclear.stages.sweeps.sweep_points import work
-(point,), _ = work(family.key, pickle.dumps(family.work), [job.point], True)
-assert not point.refused, point.refused
-print(*sorted(name for name in set(sys.modules) - before if name.split(".")[0] == "flexclear"))
-"""
-
-
-def test_every_module_that_a_point_runs_is_in_its_key(root: Path, fresh: Path):
-    path = root / "scenes/checks/clearance_slider_crank.toml"
-    known = (
-        Sources(root / "pipeline")
-        .closure(["flexclear.stages.sweeps.sweep_points", STORE, *modules(load_scene(path))])
-        .keys()
-    )
-    loaded = set(printed(LOADED, path).split())
-    assert len(loaded) > 20
-    assert loaded <= known

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
-
-from flexclear.scene.registry import lookup
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from flexclear.post.plotting.table import Table
     from flexclear.system.progress import Progress
 
-KIND = "figure or table"
 NAMES = {
     "fig01": "structure:mechanism",
     "fig03": "structure:FIG03",
@@ -75,7 +73,9 @@ def drawn(
 
 def figure(name: str) -> Figure:
     """Return the figure or table of a name; imports its module now, and with it the plotting libraries."""
-    return lookup(__name__, name, where="figures")
+    module, _, attribute = NAMES[name].partition(":")
+    found: Figure = getattr(import_module(f"{__name__}.{module}"), attribute)
+    return found
 
 
 def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

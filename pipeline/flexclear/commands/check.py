@@ -20,7 +20,7 @@ from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of
 from flexclear.scene.references import dangling
 from flexclear.scene.toml_files import read_toml, recipe_frames
 from flexclear.scene.variants import ideal, loose
-from flexclear.stages import meshing, scenes, show, simulation
+from flexclear.stages import meshing, modal_analysis, scenes, show, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options
 from flexclear.system.errors import (
@@ -152,6 +152,8 @@ def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
     for scene in loaded:
         findings.errors += scenes.unrecorded(scene)
         complete = findings.attempt(partial(Graph(scene).up_to, "post"), path) and not findings.errors
+        for part in scene.flexible().values():
+            findings.attempt(partial(modal_analysis.check, modal_analysis.params(part)), path)
         findings.attempt(partial(simulation.check_parts, simulation.params(scene)), path)
         if scene.sections is not None:
             findings.attempt(partial(_sections, scene), path)

@@ -83,5 +83,6 @@ def _mode_sets(graphs: list[Graph]) -> Task:
         run="flexclear.stages.rendering:run",
         params={"what": "modes", "format": "html", "title": "Mode sets side by side"},
         inputs=bundles,
+        code=("flexclear.stages.simulation", "flexclear.post"),
         folder=f"compare/{scenes.joined([graph.scene.name for graph in graphs])}",
     )

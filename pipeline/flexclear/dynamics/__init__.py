@@ -31,7 +31,6 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     """
     from flexclear.artifacts.labelled import of
     from flexclear.artifacts.schema import incomplete
-    from flexclear.dynamics.effects import way
     from flexclear.dynamics.record.dataset import recorded, warnings
     from flexclear.dynamics.run.progress_rate import DearError, affordable
     from flexclear.dynamics.run.run import integrate_until_stopped
@@ -39,11 +38,9 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
 
     def once(edited: Scene, judges: Judges | None = None, *, alone: bool = False) -> LabelledArrays:
         if edited.event:
-            from flexclear.dynamics.effects import EVENTS
-            from flexclear.scene.registry import lookup
+            from flexclear.dynamics.events import phases
 
-            phased: LabelledArrays = lookup(EVENTS, "phases", where="[event]")(edited, bundles, progress, judges)
-            return phased
+            return phases.simulated(edited, bundles, progress, judges)
         done = integrate_until_stopped(edited, bundles, progress, judges, alone=alone)
         if done.stopped:
             raise stopping.error(done.stopped, incomplete(recorded(done), done.stopped))
@@ -57,14 +54,15 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
             return once(scene, affordable(scene))
         except DearError as dear:
             progress(None, str(dear))
-    accuracy = way(scene, "accuracy")
+    from flexclear.dynamics.run.method_choice import accuracy
 
     def compared(edited: Scene, judges: Judges | None = None, *, alone: bool = False) -> xr.Dataset:
         return once(edited, judges, alone=alone).to_xarray()
 
     if not scene.by_need():
         return of(accuracy.deliver(scene, compared, progress))
-    method_costs = way(scene, "method selection")
+    from flexclear.dynamics.run.method_choice.method_selection import method_costs
+
     if requested:
         return of(accuracy.deliver(scene, compared, progress, method_costs(scene, bundles)))
     if scene.solver.by_need == "integrator":

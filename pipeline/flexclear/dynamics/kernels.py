@@ -15,7 +15,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import cached_property
-from importlib import import_module
 from typing import Any
 
 #: for debugging: kernels stay functions of Python, as with Numba's own setting
@@ -65,7 +64,6 @@ def _compiled(function: Callable) -> Any:
     }
     from numba import njit
 
-    import_module("flexclear.dynamics.field_types")  # named fields, which kernels use
     if not PLAIN:
         from flexclear.dynamics.lowering import KernelCompiler
 

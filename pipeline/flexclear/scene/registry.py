@@ -1,20 +1,13 @@
-"""Lookup of the code for a name in a scene; modules are imported only at their use.
-
-A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a table from the scene's name to the part:
-``"module"``, or ``"module:object"`` where a module holds more than the part; a module in a folder next to the family's
-begins with a dot. It imports none of its modules. Where a scene's models (`scene`) name the parts of a
-family already, `declared` builds the table from them.
-"""
+"""Lookup of the part for a name in a scene, and hints at the names that are meant."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Mapping
-from importlib import import_module
-from typing import Any, get_args
+from collections.abc import Mapping
+from typing import TypeVar
 
 from flexclear.system.errors import InputError
 
+Part = TypeVar("Part")
 #: largest number of names in a hint
 LISTED_NAMES = 40
 #: length above which a name is not compared with others
@@ -43,43 +36,14 @@ ELSEWHERE = (
 )
 
 
-def listed(package: str, name: str, *, where: str) -> tuple[str, str]:
-    """Return full module name, and object there or "", of the part that a family lists as `name`, without importing it.
+def lookup(table: Mapping[str, Part], name: str, *, kind: str, where: str) -> Part:
+    """Return the part that a table lists as `name`; raise InputError, placed at `where`, for an unknown name.
 
-    Raises InputError, placed at `where`, for a name that the family does not have.
+    kind: what the table lists, in words.
     """
-    family = sys.modules.get(package) or import_module(package)  # the fast way: commands call this thousands of times
-    names: Mapping[str, str] = family.NAMES
-    if name not in names:
-        raise InputError(where, f"no {family.KIND} is called '{name}'", suggestion(name, names))
-    module, _, attribute = names[name].partition(":")
-    return f"{package.rpartition('.')[0]}{module}" if module[0] == "." else f"{package}.{module}", attribute
-
-
-def module_of(package: str, name: str, *, where: str = "") -> str:
-    """Return the full module name of the part that a family lists as `name`; raise InputError as `listed` does."""
-    return listed(package, name, where=where)[0]
-
-
-def lookup(package: str, name: str, *, where: str) -> Any:
-    """Import and return the module or object that a family lists as `name`; raise InputError for unknown names."""
-    module, attribute = listed(package, name, where=where)
-    part = import_module(module)
-    return getattr(part, attribute) if attribute else part
-
-
-def declared(models: Iterable[Any], key: str = "type", made: str = "") -> dict[str, str]:
-    """Return the table of a family whose parts a scene's models declare: 'point-force' is the module `point_force`.
-
-    made: name of the part's object in the module. key: field of the models that holds the name.
-    """
-    names = [name for model in models for name in get_args(model.model_fields[key].annotation)]
-    return {name: f"{module_name(name)}:{made}".rstrip(":") for name in names}
-
-
-def module_name(name: str) -> str:
-    """Return the module of a part by the part's name in scenes."""
-    return name.replace("-", "_")
+    if name not in table:
+        raise InputError(where, f"no {kind} is called '{name}'", suggestion(name, table))
+    return table[name]
 
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:

@@ -61,7 +61,7 @@ def task(scene: Scene, *, watched: bool = False) -> Task:
         },
         context={"name": scene.name, "limits": scene.limits.written()},
         inputs=inputs,
-        modules=simulation.modules(scene),
+        code=(*simulation.CODE, "flexclear.post"),
         folder=f"plan/{scene.name.replace('/', '_')}",
         names={"nc": "plan.nc"},
     )

@@ -81,6 +81,7 @@ def _task(
         run=f"flexclear.stages.effect_study:{stage}",
         params={"title": scene.title, **watched, **outputs, **params},
         inputs=inputs,
+        code=("flexclear.post",),
         folder=f"effects/{scene.name.replace('/', '_')}",
         names={"nc": f"{stage}.nc"},
     )

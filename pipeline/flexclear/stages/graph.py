@@ -30,6 +30,12 @@ STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
 #: stage that produces each artifact, by the name in references ``<scene>:<artifact>[/<body>]`` of figures
 ARTIFACTS = {name: name for name in (*STAGES, "sections", "verdict", "tight")}
 ARTIFACTS |= {"run": "simulate", "fine-modes": "fine_modes"}
+#: code that decides the results of a module of `stages`, besides its own
+STRUCTURE, POST = ("flexclear.structure",), ("flexclear.post",)
+CODE: dict[str, tuple[str, ...]] = dict.fromkeys(("meshing", "modal_analysis", "reduction", "rigid_body"), STRUCTURE)
+CODE |= dict.fromkeys(("simulation", "analyses"), simulation.CODE)
+CODE |= {"derived_series": ("flexclear.stages.meshing", *POST), "evaluation": POST}
+CODE |= {"rendering": ("flexclear.stages.simulation", *POST)}
 #: factor of `tight` on the tolerance, factor of `fine-modes` on the number of elements
 TIGHTER, FINER = 1e-2, 4
 #: tightest useful tolerance: below it, rounding dominates the error
@@ -64,7 +70,6 @@ class Graph:
                 "meshing:run",
                 meshing.params(recipe, self.recipe),
                 part=body,
-                modules=meshing.modules(recipe),
                 context={"folder": str(recipe.parent.resolve()), "file": self.scene.recipes()[body]},
                 files=meshing.files(read_toml(recipe), recipe.parent),
             )
@@ -74,7 +79,6 @@ class Graph:
     @cached_property
     def modes(self) -> dict[str, Task]:
         """Modal analyses of the flexible bodies, by body."""
-        where = self.scene.path or self.scene.name
         return {
             body: self._task(
                 "modes",
@@ -82,7 +86,7 @@ class Graph:
                 modal_analysis.params(part),
                 {"mesh": self.mesh[body]},
                 part=body,
-                modules=modal_analysis.modules(part, f"{where} [body.{body}.modes]"),
+                check="flexclear.stages.modal_analysis:check",
             )
             for body, part in self.scene.flexible().items()
         }
@@ -90,7 +94,8 @@ class Graph:
     @cached_property
     def bundle(self) -> dict[str, Task]:
         """Reductions of the flexible bodies, by body."""
-        kinds = {body: meshing.kind_of(Path(part.mesh)) for body, part in self.scene.flexible().items()}
+        for body, part in self.scene.flexible().items():
+            reduction.check(self.scene, body, meshing.kind_of(Path(part.mesh)))
         return {
             body: self._task(
                 "bundle",
@@ -98,9 +103,8 @@ class Graph:
                 reduction.params(self.scene, body),
                 {"mesh": self.mesh[body], "modes": self.modes[body]},
                 part=body,
-                modules=(*meshing.modules(Path(part.mesh)), *reduction.modules(self.scene, body, kinds[body])),
             )
-            for body, part in self.scene.flexible().items()
+            for body in self.scene.flexible()
         }
 
     @cached_property
@@ -113,7 +117,6 @@ class Graph:
                 {},
                 {"mesh": self.mesh[body]},
                 part=body,
-                modules=meshing.modules(Path(part.mesh)),
             )
             for body, part in self.scene.meshed().items()
         }
@@ -288,10 +291,8 @@ class Graph:
         """Return a task of `simulation` or `analyses`; function, shown: names that differ from the stage's."""
         single_run = shown == "run"
         run = "simulation:run" if single_run else f"analyses:{function or stage}"
-        modules = simulation.modules(self.scene, alone=single_run)
-        task = self._task(stage, run, params, self.bodies(), shown=shown or stage, modules=modules)
-        task = replace(task, check="flexclear.stages.simulation:check_parts")
-        return replace(task, met=simulation.met(self.scene)) if single_run else task
+        task = self._task(stage, run, params, self.bodies(), shown=shown or stage)
+        return replace(task, check="flexclear.stages.simulation:check_parts")
 
     def _folder(self, below: str = "") -> str:
         return f"runs/{self.scene.name}/{below}".rstrip("/") if self.shown else ""
@@ -305,7 +306,7 @@ class Graph:
         *,
         part: str = "",
         shown: str = "",
-        modules: tuple[str, ...] = (),
+        check: str = "",
         context: Mapping[str, Any] | None = None,
         files: Mapping[str, Path] | None = None,
     ) -> Task:
@@ -326,6 +327,7 @@ class Graph:
             folder=self._folder(stage if part else ""),
             inputs=inputs or {},
             names=names,
-            modules=modules,
+            code=CODE[run.partition(":")[0]],
+            check=check,
             files=files or {},
         )

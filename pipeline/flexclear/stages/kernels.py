@@ -6,7 +6,6 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from flexclear.scene.registry import module_of
 from flexclear.stages import simulation
 from flexclear.workflow.task import Task
 
@@ -31,18 +30,18 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
         run="flexclear.stages.kernels:run",
         params={"simulate": simulation.params(scene)},
         inputs=bundles,
-        modules=simulation.modules(scene),
+        code=simulation.CODE,
     )
 
 
 def shared(scene: Scene) -> tuple[str, ...]:
     """Return a tuple that is equal for scenes that run on the same kernels: numbers are not compiled, and code
     specialised for one topology is left to the runs, a second of processor time each."""
-    from flexclear.dynamics.effects import RUNS
-    from flexclear.dynamics.run import NAMES
+    from flexclear.dynamics.effects import most_parts, schemes
+    from flexclear.scene.events import with_switched
 
-    ways = {module_of(RUNS, name) for name in NAMES}
-    return tuple(name for name in simulation.modules(scene) if name not in ways)
+    whole = with_switched(scene) if scene.event else scene
+    return (repr(most_parts(whole)), *map(repr, schemes(whole)))
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.scene import provenance
 from flexclear.scene.limits import Limits, check_cells
 from flexclear.scene.load import RECIPE, is_file, require_kind
-from flexclear.scene.registry import module_of
 from flexclear.scene.toml_files import read_toml
+from flexclear.structure.kinds import name_of
 from flexclear.system.errors import InputError
 from flexclear.system.external_files import companions
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 
     from flexclear.system.progress import Progress
 
-KINDS = "flexclear.structure.kinds"
 #: place in errors of the kinds of bodies, which do not know the recipe's file
 PLACE = "mesh recipe"
 #: keys of a recipe's shape that name files
@@ -63,14 +61,9 @@ def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = N
     check_cells(table.get("shape"), table.get("elements"), limits, recipe)
 
 
-def modules(recipe: Path) -> tuple[str, ...]:
-    """Return the module of the kind of body that a recipe describes."""
-    return (module_of(KINDS, kind_of(recipe), where=str(recipe)),)
-
-
 def kind_of(recipe: Path) -> str:
     """Return the name of the kind of body that a recipe describes."""
-    return str(import_module(KINDS).name_of(read_toml(recipe)))
+    return name_of(read_toml(recipe))
 
 
 def files(table: Mapping[str, Any], folder: Path) -> dict[str, Path]:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.scene.registry import module_of
-from flexclear.stages import meshing
+from flexclear.scene.registry import lookup
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,18 +13,19 @@ if TYPE_CHECKING:
     from flexclear.scene.parts import FlexibleBody
     from flexclear.system.progress import Progress
 
-CONDITIONS = "flexclear.structure.modes.reference"
-
 
 def params(body: FlexibleBody) -> dict[str, Any]:
     """Return the selected modal coordinates; nothing else of the body decides its modes."""
     return body.modes.model_dump(mode="json", exclude={"source"}, exclude_none=True)
 
 
-def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
-    """Return the modules of the reference conditions and of the kind of body; raise InputError for an unknown name."""
-    names = [body.modes.reference, *([body.modes.of] if body.modes.of else [])]
-    return (*(module_of(CONDITIONS, name, where=where) for name in names), *meshing.modules(Path(body.mesh)))
+def check(params: Mapping[str, Any]) -> None:
+    """Raise InputError for the name of an unknown reference condition."""
+    from flexclear.structure.modes.reference import CONDITIONS
+
+    for key in ("reference", "of"):
+        if params.get(key):
+            lookup(CONDITIONS, params[key], kind="reference condition", where=f"modes.{key}")
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

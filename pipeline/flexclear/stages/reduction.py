@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from flexclear.scene.registry import lookup, module_of
+from flexclear.scene.registry import lookup
+from flexclear.structure.kinds import STRESSED
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
     from flexclear.scene.schema import Scene
     from flexclear.system.progress import Progress
 
-STRESS = "flexclear.structure.stress"
 WHERE = "[output] stress"
 
 
@@ -25,9 +25,10 @@ def params(scene: Scene, body: str) -> dict[str, Any]:
     return requested | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
 
 
-def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
-    """Return the module for the requested stresses; raise InputError when there is none."""
-    return (module_of(STRESS, kind, where=WHERE),) if "stress" in params(scene, body) else ()
+def check(scene: Scene, body: str, kind: str) -> None:
+    """Raise InputError where stresses are requested of a kind of body that has none."""
+    if "stress" in params(scene, body):
+        lookup(STRESSED, kind, kind="stress recovery", where=WHERE)
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -38,6 +39,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     mesh, modes = inputs["mesh"], inputs["modes"]
     extra: dict[str, Any] = {}
     if params.get("stress"):
-        recover = lookup(STRESS, str(mesh.attrs.get("body_kind", "beam")), where=WHERE)
-        extra |= recover(mesh, modes, params.get("gauges", {}))
+        from flexclear.structure.stress import RECOVERIES
+
+        extra |= RECOVERIES[str(mesh.attrs.get("body_kind", "beam"))](mesh, modes, params.get("gauges", {}))
     return {"nc": bundle.build(mesh, modes, extra, stiffening=params.get("stiffening", False))}

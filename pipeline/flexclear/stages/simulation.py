@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexclear import dynamics
 from flexclear.artifacts.paths import results_root
-from flexclear.dynamics.compile.reach import met as met
-from flexclear.dynamics.compile.reach import modules as modules
 from flexclear.scene import provenance
 from flexclear.scene.parts import UNSEEN
 from flexclear.system import machine
@@ -24,6 +22,8 @@ if TYPE_CHECKING:
     from flexclear.scene.schema import Scene
     from flexclear.system.progress import Progress
 
+#: code that decides results of the engine, besides the module of a stage's own function
+CODE = ("flexclear.stages.simulation", "flexclear.dynamics")
 #: either datasets or labelled arrays
 Data = TypeVar("Data")
 #: limits of a scene rebuilt without its own: its requests were checked when the scene was read

@@ -50,7 +50,7 @@ def tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list[Task]:
                 "members": [first, end],
             },
             inputs=graph.bodies(),
-            modules=simulation.modules(variant),
+            code=("flexclear.stages.kernels", *simulation.CODE),
         )
         for first, end in zip([0, *ends], ends, strict=False)
     ]

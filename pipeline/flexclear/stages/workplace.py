@@ -170,7 +170,7 @@ def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
     if jobs is not None and jobs < 1:
         raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
     end = math.inf if limit is None else time.monotonic() + seconds(limit, "--limit")
-    sources = sources_of(TREE, root / "cache" / "imports.json")
+    sources = sources_of(TREE, root / "cache" / "code.json")
     why = f"the time limit (--limit {limit}) is reached"
     # cached: the same damaged file is found each time that a task asks for it, and reported once
     return Workplace(Store(root, say=cache(monitor.say)), sources, monitor, jobs, (end, why))

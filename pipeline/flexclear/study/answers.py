@@ -161,6 +161,7 @@ class Answers:
             run="flexclear.stages.evaluation:stability",
             params={"by_need": self.scene.by_need()},
             inputs={"run": graph.simulate, **study, **members},
+            code=("flexclear.post",),
             folder=f"stability/{self.scene.name.replace('/', '_')}",
             names={"nc": "stability.nc"},
         )

@@ -89,6 +89,7 @@ def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
         run="flexclear.stages.evaluation:comparison",
         params={"labels": labels, "quantities": list(quantities.values())},
         inputs=inputs,
+        code=("flexclear.post",),
         folder=f"compare/{joined(labels)}",
         names={"nc": "compare.nc"},
     )

@@ -165,6 +165,7 @@ class Study:
                 "peers": list(self.peers),
             },
             inputs=inputs | self._ensembles,
+            code=("flexclear.post",),
             folder=f"cost/{self.scene.name}",
             names={"nc": "cost.nc"},
         )
@@ -325,7 +326,7 @@ def _measured(design: cost_design.Design, function: str, more: Mapping[str, obje
         run=f"flexclear.stages.cost_point:{function}",
         params={"simulate": simulation.params(design.scene, ensemble=ensemble), **more},
         inputs={**_bundles(design), "kernels": compiled},
-        modules=simulation.modules(design.scene),
+        code=("flexclear.stages.kernels", *simulation.CODE),
         exclusive=True,
     )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 
 from flexclear.system.errors import ResourceError
@@ -58,7 +57,8 @@ def instruction_set() -> dict[str, str]:
 
     It is not part of any key: results of other processors differ within the tolerances of their runs.
     """
-    llvm = import_module("llvmlite.binding")  # by name, so that the library's version enters no key
+    import llvmlite.binding as llvm  # here, since only runs need it
+
     features = llvm.get_host_cpu_features()
     vectors = ", ".join(name for name in INSTRUCTIONS if features.get(name)) or "none of " + ", ".join(INSTRUCTIONS)
     facts = {"processor": llvm.get_host_cpu_name(), "instructions": vectors}

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from itertools import combinations
 
 from flexclear.artifacts.store import Record, Store
 from flexclear.system import machine, threads
 from flexclear.system.errors import ResourceError
 from flexclear.system.progress import Progress
-from flexclear.workflow import encounters, journal
+from flexclear.workflow import journal
 from flexclear.workflow.fingerprint import Sources
 from flexclear.workflow.task import ARRAYS, Task, contents, facts, in_order, key, reasons
 
@@ -53,13 +52,12 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             load = store.arrays if hasattr(run, ARRAYS) else store.load
             data = {role: load(above) for role, above in inputs.items()}
             begun = store.path(task.stage, name, "part")
-            with threads.one(), encounters.noted() as met, journal.storage(begun.parent, begun.stem) as storage:
+            with threads.one(), journal.storage(begun.parent, begun.stem) as storage:
                 product = run({**task.params, **task.context}, data, progress)
             changed = [fact for fact, value in contents(task).items() if known[fact] != value]
             if changed:
                 raise ResourceError(f"{changed[0]} changed while it was read; run again")
-            of_this = _facts(task, inputs, sources, [name for name in task.met if name in met])
-            record = store.put(task.stage, key(of_this), product, of_this, machine.instruction_set())
+            record = store.put(task.stage, name, product, known, machine.instruction_set())
             storage.remove()
     store.show(record, task.folder, task.names, task.label)
     return record
@@ -78,10 +76,7 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
     last = store.last(task.folder, task.label)
-    # code for events that the last run did not meet is not compared
-    always, last_facts = set(task.roots(())), last.facts if last is not None else {}
-    names = [name for name, code in task.met.items() if any(f"module {m}" in last_facts for m in {*code} - always)]
-    now = _facts(task, fresh, sources, names)
+    now = _facts(task, fresh, sources)
     if last is None and stale:
         return State(task, None, ("never run",))
     above = [f"its input {name} would be computed again" for name in sorted(stale)]
@@ -100,16 +95,8 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
 
 
 def _stored(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
-    """Return the artifact of a task, whichever of its possible events the run has met."""
-    for count in range(len(task.met) + 1):
-        for met in combinations(task.met, count):
-            record = store.find(task.stage, key(_facts(task, inputs, sources, met)))
-            if record is not None:
-                return record
-    return None
+    return store.find(task.stage, key_of(task, inputs, sources))
 
 
-def _facts(
-    task: Task, inputs: Mapping[str, Record], sources: Sources, met: Iterable[str] | None = None
-) -> dict[str, str]:
-    return facts(task, {name: record.digest for name, record in inputs.items()}, sources, met)
+def _facts(task: Task, inputs: Mapping[str, Record], sources: Sources) -> dict[str, str]:
+    return facts(task, {name: record.digest for name, record in inputs.items()}, sources)

@@ -1,9 +1,7 @@
-"""Sources that a result depends on: the static import closure of modules, and their digests.
+"""Digests of the program's code, and versions of libraries, on which results depend.
 
-A module counts by its syntax tree without comments, docstrings and the words of the errors that it raises: wording
-changes no result. Only names below `OWN` are followed; other top-level imports are libraries, which count by their
-version. Parts looked up by name at run time are not visible here: code that builds a task names their modules as
-further roots.
+Code counts by package: by the syntax trees of its modules without comments, docstrings and the words of the errors that
+they raise, since wording changes no result, and by the style and scripts next to them.
 """
 
 from __future__ import annotations
@@ -12,25 +10,23 @@ import ast
 import contextlib
 import hashlib
 import os
-import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from flexclear.artifacts.disk import checked, digest_of, publish, read_checked
+from flexclear.artifacts.disk import checked, publish, read_checked
 from flexclear.artifacts.paths import TREE as TREE
 
 #: packages whose modules count by their code: the program, and applications next to its sources in a checkout
 OWN = ("flexclear", "papers", "benchmarks")
-#: modules that only word messages, citations and validation errors: no result depends on them
-_SCENE = "flexclear.scene"
-WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
-#: suffixes of the files that the code of a package reads next to its modules
-ASSETS = (".css", ".js")
+#: packages below all stages, whose code every result depends on
+CORE = tuple(f"{OWN[0]}.{name}" for name in ("system", "numerics", "scene", "artifacts", "workflow"))
+#: suffixes of the files that count: modules, and what pages are made of
+COUNTED = (".py", ".css", ".js")
 #: attempts to parse a source, which concurrent threads of libraries may disturb
 ATTEMPTS = 10
 _PARSING = Lock()
@@ -40,164 +36,101 @@ MACHINE = {"filelock", "platformdirs", "psutil"}
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtkmodules": "vtk"}
 
 
-@dataclass(frozen=True, slots=True)
-class Module:
-    """One source file. text, digest: digests of its bytes and of its code.
-
-    own, libraries: modules and libraries that it imports. package: whether other modules may be below it.
-    """
-
-    text: str
-    digest: str
-    own: tuple[str, ...]
-    libraries: tuple[str, ...]
-    package: bool
-
-    def written(self) -> list[Any]:
-        """Return the entry of this module in the memo of a `Sources`."""
-        return [self.text, self.digest, list(self.own), list(self.libraries)]
-
-
 @dataclass(frozen=True)
 class Sources:
-    """The source tree under `root`; each file is read at most once.
+    """The source tree under `root`; each file is read at most once, and assumed not to change while it is in use.
 
-    memo: file with the imports of each module and the digest of the text they were read from, so that only edited files
-    are parsed. None parses all files. Sources are assumed not to change while one process reads them.
+    memo: file with the digest of each file's code and the libraries that it imports, next to the digest of its bytes,
+    so that only edited files are parsed. None parses all files.
     """
 
     root: Path
     memo: Path | None = None
-    read: dict[str, Module | None] = field(default_factory=dict, repr=False, compare=False)
+    read: dict[str, list[Any]] = field(default_factory=dict, repr=False, compare=False)
     remembered: dict[str, list[Any]] = field(default_factory=dict, repr=False, compare=False)
-    next: dict[str, tuple[str, ...]] = field(default_factory=dict, repr=False, compare=False)
-    closures: dict[frozenset[str], dict[str, Module]] = field(default_factory=dict, repr=False, compare=False)
 
-    def closure(self, roots: Iterable[str]) -> dict[str, Module]:
-        """Return every own module that `roots` reach by imports, including the packages above.
+    def code(self, names: Iterable[str]) -> dict[str, str]:
+        """Return facts of packages or modules: the digest of each, and the versions of the libraries they import."""
+        found, libraries = dict[str, str](), set[str]()
+        for name in names:
+            files = self.files(name)
+            found[f"code of {name.removeprefix(f'{OWN[0]}.')}"] = _digest_of(files)
+            libraries.update(*(libraries for _, _, libraries in files.values()))
+        return found | {f"library {name}": library_version(name) for name in sorted(libraries - MACHINE)}
 
-        Raises LookupError for a root that is not a module of the tree.
+    def digest(self, name: str, without: Collection[str] = ()) -> str:
+        """Return the digest of the code of a package; without: names of its modules and packages that do not count."""
+        start = len(_place(name)) + 1
+        files = self.files(name).items()
+        return _digest_of(
+            {path: of for path, of in files if path[start:].split("/")[0].removesuffix(".py") not in without}
+        )
+
+    def files(self, name: str) -> dict[str, list[Any]]:
+        """Return digest of the bytes, digest of the code and libraries of each file of a package or module, by path.
+
+        Raises LookupError when there is no such package or module.
         """
-        requested = frozenset(roots)
-        if requested not in self.closures:
-            if self.memo is not None and not self.remembered:
-                self.remembered.update(read_checked(self.memo) or {})
-            self.closures[requested] = self._reach(requested)
-            new = {name: module.written() for name, module in self.closures[requested].items()}
-            if self.memo is not None and any(self.remembered.get(name) != entry for name, entry in new.items()):
-                self.remembered.update(new)
-                with contextlib.suppress(OSError):
-                    publish(self.memo, checked(self.remembered))
-        return self.closures[requested]
+        if self.memo is not None and not self.remembered:
+            self.remembered.update(read_checked(self.memo) or {})
+        paths = sorted(_files(self._folder(name), _place(name)))
+        if not paths:
+            raise LookupError(f"no module {name} under {self.root}")
+        found = {path: self._read(path) for path in paths}
+        if self.memo is not None and any(self.remembered.get(path) != of for path, of in found.items()):
+            self.remembered.update(found)
+            with contextlib.suppress(OSError):
+                publish(self.memo, checked(self.remembered))
+        return found
 
-    def code(self, roots: Iterable[str]) -> dict[str, str]:
-        """Return facts of the code that `roots` reach, by kind and name: digests of modules and of assets of packages,
-        versions of libraries."""
-        closure = self.closure(roots)
-        libraries = frozenset().union(*(module.libraries for module in closure.values())) - MACHINE
-        return {f"module {name}": module.digest for name, module in closure.items() if name not in WORDING} | {
-            **{f"asset {path.name}": digest_of(path) for path in self._assets(closure)},
-            **{f"library {name}": version for name, version in library_versions(libraries).items()},
-        }
+    def _folder(self, name: str) -> Path:
+        """Return the folder with a package: applications such as `papers` are in the folder above the root."""
+        return self.root if name.partition(".")[0] == OWN[0] else self.root.parent
 
-    def _assets(self, closure: Mapping[str, Module]) -> Iterator[Path]:
-        """Yield the files next to the modules of packages that their code reads."""
-        for name, module in closure.items():
-            source = source_file(self.root, name) if module.package else None
-            if source is not None:
-                yield from (source.parent / entry for entry in os.listdir(source.parent) if entry.endswith(ASSETS))
+    def _read(self, path: str) -> list[Any]:
+        if path not in self.read:
+            source = (self._folder(path.replace("/", ".")) / path).read_bytes()
+            known = self.remembered.get(path, [""])
+            text = hashlib.sha256(source).hexdigest()
+            self.read[path] = known if known[0] == text else [text, *_examined(source, path.endswith(".py"))]
+        return self.read[path]
 
-    def module(self, name: str) -> Module | None:
-        """Return the module called `name`, or None when it has no file (an attribute, say)."""
-        if name not in self.read:
-            above = self.read.get(name.rpartition(".")[0])
-            # most names are attributes of modules: this saves the search for four files
-            path = source_file(self.root, name) if above is None or above.package else None
-            self.read[name] = None if path is None else self._parse(path, name)
-        return self.read[name]
 
-    def _reach(self, requested: frozenset[str]) -> dict[str, Module]:
-        modules: dict[str, Module] = {}
-        waiting = sorted(requested)
-        for name in waiting:
-            if self.module(name) is None:
-                raise LookupError(f"no module {name} under {self.root}")
-        while waiting:
-            name = waiting.pop()
-            module = self.read[name]
-            if name not in modules and module is not None:
-                modules[name] = module
-                waiting.extend(self._next(name, module))
-        return modules
+def _place(name: str) -> str:
+    return name.replace(".", "/")
 
-    def _next(self, name: str, module: Module) -> tuple[str, ...]:
-        """Return the modules that a module reaches directly; imported names that are attributes are dropped."""
-        if name not in self.next:
-            reached = sorted({*module.own, *parents(name)})  # a module comes before its attributes
-            self.next[name] = tuple(other for other in reached if self.module(other) is not None)
-        return self.next[name]
 
-    def _parse(self, path: Path, name: str) -> Module:
-        source, package = path.read_bytes(), path.name == "__init__.py"
-        text, *known = self.remembered.get(name, [""])
-        if text != hashlib.sha256(source).hexdigest() or len(known) != 3:
-            return _examined(source, name, package)
-        digest, own, libraries = known
-        return Module(text, digest, tuple(own), tuple(libraries), package)
+def _files(folder: Path, place: str) -> Iterator[str]:
+    """Yield the paths of the files of a package or module below a folder."""
+    if (folder / f"{place}.py").is_file():
+        yield f"{place}.py"
+    for below, folders, names in os.walk(folder / place):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        inside = os.path.relpath(below, folder).replace(os.sep, "/")
+        yield from (f"{inside}/{name}" for name in names if name.endswith(COUNTED))
+
+
+def _digest_of(files: dict[str, list[Any]]) -> str:
+    return hashlib.sha256(repr([(path, code) for path, (_, code, _) in files.items()]).encode()).hexdigest()
 
 
 @cache
-def _examined(source: bytes, name: str, package: bool) -> Module:
+def _examined(source: bytes, module: bool) -> tuple[str, list[str]]:
+    """Return the digest of the code of a file, and the libraries that it imports."""
+    if not module:
+        return hashlib.sha256(source).hexdigest(), []
     tree = _parsed(source)
-    own, libraries = (tuple(sorted(names)) for names in _imported(tree, name, package, deep=True))
-    code = code_digest(tree)
-    return Module(hashlib.sha256(source).hexdigest(), code, own, libraries, package)
+    libraries = set(_imported(tree)) - {*OWN, *sys.stdlib_module_names}
+    return code_digest(tree), sorted(libraries)
 
 
-#: this program's own modules, in the state in which this process read them
-_OWN_MODULES: dict[str, Module | None] = {}
+#: this program's own files, in the state in which this process read them
+_OWN_FILES: dict[str, list[Any]] = {}
 
 
 def sources_of(root: Path, memo: Path | None = None) -> Sources:
     """Return the source tree under `root`; this program's own is read once per process, which runs that state."""
-    return Sources(root, memo, _OWN_MODULES if root == TREE else {})
-
-
-def source_file(root: Path, name: str) -> Path | None:
-    """Return the file of the module called `name`; None without such a file.
-
-    root: folder with the package `flexclear`; applications such as `papers` are in the folder above it.
-    """
-    # every command searches for hundreds of modules: text paths take a fifth of the time of Path objects
-    folder = root if name.startswith(OWN[0]) else root.parent
-    base = f"{folder}{os.sep}{name.replace('.', os.sep)}"
-    return next((Path(path) for path in (f"{base}.py", f"{base}{os.sep}__init__.py") if os.path.isfile(path)), None)
-
-
-def parents(name: str) -> list[str]:
-    """Return the packages above a module: ``a.b.c`` -> ``a.b``, ``a``."""
-    parts = name.split(".")
-    return [".".join(parts[:n]) for n in range(1, len(parts))]
-
-
-def imported(source: bytes, name: str, package: bool, *, deep: bool = True) -> tuple[set[str], set[str]]:
-    """Return own names and libraries that one source text imports; imports for type checkers do not count.
-
-    deep: also imports inside functions.
-    """
-    return _imported(_parsed(source), name, package, deep)
-
-
-def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[set[str], set[str]]:
-    own: set[str] = set()
-    libraries: set[str] = set()
-    for target in _imports(tree.body, name if package else name.rpartition(".")[0], deep):
-        top = target.partition(".")[0]
-        if top in OWN:
-            own.add(target)
-        elif top not in sys.stdlib_module_names:
-            libraries.add(top)
-    return own, libraries
+    return Sources(root, memo, _OWN_FILES if root == TREE else {})
 
 
 def code_digest(tree: ast.Module) -> str:
@@ -240,42 +173,13 @@ def _parsed(source: bytes) -> ast.Module:
     return ast.parse(source)
 
 
-def _imports(statements: Iterable[ast.stmt], package: str, deep: bool) -> Iterable[str]:
-    """Yield dotted names that statements import, in functions only if `deep`; ``from a import b`` gives a and a.b."""
-    for node in statements:
+def _imported(tree: ast.Module) -> Iterator[str]:
+    """Yield the top-level names that a module imports anywhere."""
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")[: len(package.split(".")) + 1 - node.level] if node.level else []
-            base = ".".join([*above, *([node.module] if node.module else [])])
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.If) and _is_type_checking(node.test):
-            yield from _imports(node.orelse, package, deep)
-        elif isinstance(node, ast.Match):
-            yield from (name for case in node.cases for name in _imports(case.body, package, deep))
-        elif deep or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            # imports are statements, so expressions need not be walked
-            for block in ("body", "orelse", "handlers", "finalbody"):
-                yield from _imports(getattr(node, block, ()), package, deep)
-
-
-def _is_type_checking(test: ast.expr) -> bool:
-    name = test.attr if isinstance(test, ast.Attribute) else getattr(test, "id", "")
-    return name == "TYPE_CHECKING"
-
-
-@cache
-def library_versions(packages: frozenset[str]) -> dict[str, str]:
-    """Return the versions of the libraries of these import packages, and of all libraries that they require."""
-    versions = {name: library_version(name) for name in packages}
-    waiting = sorted(packages)
-    while waiting:
-        for name in _required(waiting.pop()):
-            if name not in versions and library_version(name) != "absent":
-                versions[name] = library_version(name)
-                waiting.append(name)
-    return dict(sorted(versions.items()))
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield str(node.module).partition(".")[0]
 
 
 @cache
@@ -287,15 +191,3 @@ def library_version(package: str) -> str:
         return version(DISTRIBUTIONS.get(package, package))
     except PackageNotFoundError:
         return "absent"
-
-
-@cache
-def _required(package: str) -> tuple[str, ...]:
-    """Return the distributions that a library requires without extras; some only on other machines."""
-    from importlib.metadata import PackageNotFoundError, requires
-
-    try:
-        lines = (line.partition(";") for line in requires(DISTRIBUTIONS.get(package, package)) or ())
-    except PackageNotFoundError:
-        return ()
-    return tuple(re.split(r"[^\w.-]", name, maxsplit=1)[0] for name, _, condition in lines if "extra" not in condition)

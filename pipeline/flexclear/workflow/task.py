@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
 from flexclear.artifacts.disk import digest_of
-from flexclear.workflow.fingerprint import Sources
+from flexclear.workflow.fingerprint import CORE, Sources
 
-#: module that every artifact passes through on its way to disk, so that its libraries count for every key
-STORE = "flexclear.artifacts.store"
 #: attribute of functions that `given_arrays` marks
 ARRAYS = "given_arrays"
 #: key of the context that holds the file of a task's scene, for messages
@@ -42,8 +40,7 @@ class Task:
     files: every file that the function opens, by its name for users: its content counts, its path does not.
     context: further arguments that must not affect the result: paths of files, names for messages.
     inputs: tasks whose artifact ``nc`` the function receives, by name.
-    modules: modules that it reaches by a name in `params`, besides its imports.
-    met: modules that it reaches only if it meets an event (`encounters`), by the name of the event.
+    code: packages and modules, besides its own module and `fingerprint.CORE`, whose code decides its result.
     folder: folder where its files are shown, below the results folder; empty: nowhere.
     names: file of the artifact -> name shown there; a file that is not listed keeps its name.
     check: ``"module:function"``, called as ``check(params)`` before any task runs; it raises InputError.
@@ -57,18 +54,12 @@ class Task:
     folder: str = ""
     part: str = ""
     inputs: Mapping[str, Task] = field(default_factory=dict)
-    modules: tuple[str, ...] = ()
-    met: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    code: tuple[str, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     exclusive: bool = False
     context: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, Path] = field(default_factory=dict)
     check: str = ""
-
-    def roots(self, met: Iterable[str] | None = None) -> tuple[str, ...]:
-        """Return the modules from which it reaches all others if it meets the named events, by default all."""
-        names = self.met if met is None else met
-        return (self.run.partition(":")[0], *self.modules, *(module for name in names for module in self.met[name]))
 
     @property
     def label(self) -> str:
@@ -90,16 +81,15 @@ def in_order(tasks: list[Task]) -> list[Task]:
     return list(ordered)
 
 
-def facts(task: Task, digests: Mapping[str, str], sources: Sources, met: Iterable[str] | None = None) -> dict[str, str]:
+def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str, str]:
     """Return everything that decides the artifact, in words: kind and name -> value.
 
-    digests: digest of each known input; leave one out to compare the rest. met: names in `Task.met` of the events that
-    were met; default: all.
+    digests: digest of each known input; leave one out to compare the rest.
     """
     result = {f"parameter {name}": value for name, value in flatten(task.params)}
     result |= {f"input {name}": digest for name, digest in digests.items()}
     result |= contents(task)
-    result |= sources.code((*task.roots(met), STORE))
+    result |= sources.code((*CORE, *task.code, task.run.partition(":")[0]))
     return {**result, "function": task.run}
 
 

@@ -10,7 +10,7 @@ state, with the invariants of the bundle,
 
 after Shabana, *Dynamics of Multibody Systems*, ch. 5, and Wang & Wang (2019), eqs. (9)-(15). They come from a
 Lagrangian, so power and energy agree to rounding.
-Where loads stiffen the body, the quadratic part also moves its centre and its frames (see `effects.stiffening.bodies`).
+Where loads stiffen the body, the quadratic part also moves its centre and its frames (see `bodies.stiffening`).
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def of_each(body: Callable) -> Callable:
 
 def flexible_bodies(stiffening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]:
     """Return the factory of the kernels of flexible bodies; its argument is the mass matrix module, `articulated` or
-    `composite`. `stiffening`: linear motion of frames, or with the part of `effects.stiffening.bodies`."""
+    `composite`. `stiffening`: linear motion of frames, or with the part of `bodies.stiffening`."""
     return partial(_flexible_bodies, stiffening)
 
 

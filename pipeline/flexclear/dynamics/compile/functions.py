@@ -1,6 +1,6 @@
 """Compiled functions of a mechanism, cached on disk across processes.
 
-Each is a generated file (`sources`) whose name is a digest of the sources of all kernels that it can reach and of the
+Each is a generated file (`sources`) whose name is a digest of its text, of the code of all kernels and of the
 compiler's versions. The functions call each other by address (`calls`), so that mechanisms share them.
 """
 
@@ -23,15 +23,14 @@ import numpy as np
 from flexclear.artifacts.disk import disk_limits, publish
 from flexclear.artifacts.paths import kernel_root
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile import machine_code, reach, sources
+from flexclear.dynamics.compile import machine_code, sources
 from flexclear.dynamics.compile.compiler_process import second_process
 from flexclear.dynamics.compile.files import CODE, SIGNATURES, compiled, interpreted, load_files, loaded
 from flexclear.dynamics.compile.folder import prune, writable
 from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
-from flexclear.dynamics.effects import DEEP, METHOD, Parts, Scheme
+from flexclear.dynamics.effects import Parts, Scheme
 from flexclear.dynamics.kernels import INTERPRETED
-from flexclear.workflow.encounters import meet
-from flexclear.workflow.fingerprint import library_version
+from flexclear.workflow.fingerprint import TREE, library_version, sources_of
 
 #: of each function: description for progress, and the header's index of its address if others call it (specialised code
 #: has one per selection of closure rows). This process compiles in this order, the second one in the opposite order;
@@ -49,6 +48,9 @@ FUNCTIONS: dict[str, tuple[str, int | None]] = {
     SPECIALISED: ("specialised equations of motion", None),
     "resolve": ("location of events", m.RESOLVE),
 }
+#: what of `dynamics` no generated file imports
+NO_KERNELS = {"analyses", "events", "linear", "mechanics", "model", "plan", "record", "routines", "run"}
+NO_KERNELS |= {"sensitivity", "starts"}
 _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
 
 
@@ -89,9 +91,6 @@ def entry(
 
     equations: sources by name of specialised code, or of generic kernels, which are compiled where the former has none.
     """
-    meet(METHOD.format(scheme.integrator))
-    if parts.articulated:
-        meet(DEEP)
     folder, began = writable(kernel_root(), report), time.monotonic()
     texts = {**sources.sources(parts, scheme), **equations}
     files = {name: _file(folder, name, source) for name, source in texts.items()}
@@ -190,9 +189,13 @@ def _file(folder: Path, name: str, source: str) -> Path:
 
 @cache
 def digest(source: str) -> str:
-    """Return the digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
-    total = hashlib.sha256(source.encode())
-    total.update(f"{library_version('numba')} {library_version('llvmlite')} {sys.version_info[:2]}".encode())
-    for name, source_digest in sorted(reach.reached(source).items()):
-        total.update(f"{name} {source_digest}".encode())
-    return total.hexdigest()[:20]
+    """Return the digest of a generated source, of the code of all kernels, and of the compiler."""
+    return hashlib.sha256(f"{source}{_kernels()}".encode()).hexdigest()[:20]
+
+
+@cache
+def _kernels() -> str:
+    """Return digests and versions of all that compiled code depends on besides its generated source."""
+    known = sources_of(TREE, kernel_root() / "code.json")
+    code = known.digest("flexclear.dynamics", NO_KERNELS), known.digest("flexclear.scene.event_kinds")
+    return f"{code} {library_version('numba')} {library_version('llvmlite')} {sys.version_info[:2]}"

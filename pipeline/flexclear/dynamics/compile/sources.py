@@ -15,25 +15,25 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from flexclear.dynamics.effects import (
-    FORMS,
-    FRICTION_LAWS,
-    INTEGRATORS,
-    JOINTS,
-    LOADS,
-    RUNS,
-    SURFACES,
-    Parts,
-    Scheme,
-)
-from flexclear.dynamics.effects.effect import PACKAGE, Effect
+from flexclear.dynamics.compile import formulas
+from flexclear.dynamics.effects import Parts, Scheme
+from flexclear.dynamics.effects.effect import Effect
 from flexclear.scene import integrators
-from flexclear.scene.registry import listed, lookup
 
 if TYPE_CHECKING:
     from flexclear.dynamics.specialise.topology import Topology
 
 DYNAMICS = "flexclear.dynamics"
+INTEGRATE = f"{DYNAMICS}.integrate"
+#: packages with the tables of parts
+FAMILIES = {
+    "JOINTS": f"{DYNAMICS}.joints",
+    "SURFACES": f"{DYNAMICS}.contact.surfaces",
+    "FORMS": f"{DYNAMICS}.contact.form",
+    "FRICTION_LAWS": f"{DYNAMICS}.contact.friction",
+    "LOADS": f"{DYNAMICS}.loads",
+    "METHODS": INTEGRATE,
+}
 #: modules of calls by address, and of functions assembled from LLVM code
 CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
 #: specialised code: right-hand side as steps call it, right-hand side with all its side results, recorded quantities
@@ -64,15 +64,13 @@ class Composition:
         self.imports.append((module, name))
         return name
 
-    def part(self, package: str, name: str) -> str:
-        """Return the expression for a family's part: a module, or an attribute of one, which is imported."""
-        module, attribute = listed(package, name, where="parts")
-        below, _, own = module.rpartition(".")
-        return f"{self.take(below, own)}.{attribute}".rstrip(".")
+    def part(self, table: str, name: str) -> str:
+        """Return the expression for a part that a table of `FAMILIES` lists."""
+        return f'{self.take(FAMILIES[table], table)}["{name}"]'
 
-    def family(self, package: str, names: Iterable[str]) -> str:
-        """Return the expression for a tuple of a family's parts."""
-        return "(" + "".join(f"{self.part(package, name)}, " for name in names) + ")"
+    def family(self, table: str, names: Iterable[str]) -> str:
+        """Return the expression for a tuple of parts that a table lists."""
+        return "(" + "".join(f"{self.part(table, name)}, " for name in names) + ")"
 
     @property
     def tree(self) -> str:
@@ -82,7 +80,7 @@ class Composition:
     @property
     def forms(self) -> str:
         """Expression for the forms of normal forces."""
-        return self.family(FORMS, self.parts.forms)
+        return self.family("FORMS", self.parts.forms)
 
     @property
     def harmonics(self) -> str:
@@ -108,9 +106,9 @@ class Composition:
 
     def _of(self, effect: Effect, text: str) -> str:
         """Return the expression of an argument that an effect declares, after importing its names."""
-        kinds, own = self.parts.kinds(effect.name), f"{PACKAGE}.{effect.name}"
-        text = re.sub(r"<(?:(\w+)\.)?(\w+)>", lambda m: self.take(f"{own}.{m[1]}" if m[1] else own, m[2]), text)
-        chosen = self.family(f"{DYNAMICS}.{effect.family}", kinds) if kinds and "{kinds}" in text else ""
+        kinds = self.parts.kinds(effect.name)
+        text = re.sub(r"<([\w.]+)\.(\w+)>", lambda m: self.take(f"{DYNAMICS}.{m[1]}", m[2]), text)
+        chosen = self.family(effect.family, kinds) if kinds and "{kinds}" in text else ""
         return text.format(file=self, kinds=chosen)
 
     def add_closures(self) -> None:
@@ -274,7 +272,7 @@ def _observe(parts: Parts) -> str:
 
 def _advance(parts: Parts, scheme: Scheme) -> str:
     file = _steps(parts, scheme, f"steps of {scheme}", "steps", "make_advance")
-    file.given["stepping"] = file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive")
+    file.given["stepping"] = file.take(INTEGRATE, "fixed" if scheme.fixed else "adaptive")
     if "events" in file.given:
         file.given["resolve"] = "calls.resolve"
     file.take(DYNAMICS, "memory as m")
@@ -283,13 +281,12 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
 
 def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> Composition:
     """Return a file for steps, or for the events in them."""
-    module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
-    file = Composition(parts, what, kernel, (f"{INTEGRATORS}.stepper", maker))
+    file = Composition(parts, what, kernel, (f"{INTEGRATE}.stepper", maker))
     file.given = {
         "evaluate": "calls.rates",
         "project": file.projection,
         "retract": "calls.retract",
-        "method": file.take(module, method),
+        "method": file.part("METHODS", scheme.integrator),
     }
     if integrators.INTEGRATORS[scheme.integrator].reads_all:
         file.given["complete"] = f"(calls.evaluate, {file.tree})"
@@ -297,7 +294,7 @@ def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> 
     if events:
         file.given["events"] = events
     if parts.closures:
-        file.given["poses"] = file.take(INTEGRATORS, "singular_step")
+        file.given["poses"] = file.take(INTEGRATE, "singular_step")
     return file
 
 
@@ -306,21 +303,21 @@ def _events(file: Composition, scheme: Scheme) -> str:
     parts, chosen = file.parts, not scheme.fixed
     touching = parts.surfaces or any(effect.touches for effect in parts.present)
     if touching and not scheme.located:
-        return file.take(f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
+        return file.take(f"{INTEGRATE}.step_end_events", "AT_STEP_ENDS")
     guarded = chosen and (parts.frictions or parts.load_kinks or any(effect.guards for effect in parts.present))
     if touching:
-        located = file.take(f"{INTEGRATORS}.contact_events", "located")
-        given = [file.take(f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")]
+        located = file.take(f"{INTEGRATE}.contact_events", "located")
+        given = [file.take(f"{INTEGRATE}.contact_phases", "regimes" if parts.frictions else "no_regimes")]
         if guarded:
-            given.append(file.take(f"{INTEGRATORS}.guards", "AMONG_CONTACTS"))
+            given.append(file.take(f"{INTEGRATE}.guards", "AMONG_CONTACTS"))
         return f"{located}({', '.join(given)})"
-    return file.take(f"{INTEGRATORS}.guards", "GUARDS") if guarded else ""
+    return file.take(f"{INTEGRATE}.guards", "GUARDS") if guarded else ""
 
 
 def _joints(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
     """Return a file that depends on the joints."""
     file = Composition(parts, f"{what} {', '.join(parts.joints)}", kernel, maker)
-    file.given["joints"] = file.family(JOINTS, parts.joints)
+    file.given["joints"] = file.family("JOINTS", parts.joints)
     return file
 
 
@@ -330,7 +327,7 @@ def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Com
     if parts.flexible:
         file.given["flexible"] = file.flexible
     if parts.surfaces:
-        surfaces, frictions = file.family(SURFACES, parts.surfaces), file.family(FRICTION_LAWS, parts.frictions)
+        surfaces, frictions = file.family("SURFACES", parts.surfaces), file.family("FRICTION_LAWS", parts.frictions)
         contacts = file.take(f"{DYNAMICS}.contact.forces", "make_contacts")
         file.given["contacts"] = f"{contacts}(surfaces={surfaces}, forms={file.forms}, frictions={frictions})"
     if parts.loads:
@@ -342,11 +339,11 @@ def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Com
 
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
     """Return the expression for the kernel of a kind of loads, which may call that of an expression (`_formulas`)."""
-    module = file.part(LOADS, name)
+    module = file.part("LOADS", name)
     if not formula:
         return f"{module}.apply"
     file.take(f"{DYNAMICS}.kernels", "kernel")
-    file.take(LOADS, "looks")
+    file.take(FAMILIES["LOADS"], "looks")
     return f"{module}.applying(formula{number})"
 
 
@@ -356,7 +353,6 @@ def _formulas(parts: Parts) -> str:
     texts = [(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1]
     if not texts:
         return ""
-    formulas = lookup(RUNS, "expressions", where="parts")  # `effects.ways` lists it for scenes with such loads
     return "\n\n".join(formulas.source(*text) for text in texts)
 
 

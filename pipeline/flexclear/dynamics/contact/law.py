@@ -8,8 +8,8 @@ from math import inf, isfinite
 from typing import NamedTuple
 
 from flexclear.dynamics.contact import restitution as closed_form
+from flexclear.dynamics.contact.form import FORMS
 from flexclear.scene.clearance import Hysteretic
-from flexclear.scene.registry import lookup
 
 #: largest deviation of the delivered from the requested restitution within a law's range
 RESTITUTION_ERROR = 0.05
@@ -43,7 +43,7 @@ class Resolved:
 
     def depth(self, force: float) -> float:
         """Return the penetration [m or rad] whose elastic force is `force` [N or N m], >= 0."""
-        depth: float = lookup("flexclear.dynamics.contact.form", self.form, where="[normal]").depth(force, self.numbers)
+        depth: float = FORMS[self.form].depth(force, self.numbers)
         return depth
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.scene.registry import lookup
+from flexclear.dynamics.contact.surfaces import SURFACES
 from flexclear.system.errors import SolverError
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
     found = [] if law.warning is None else [f"{name}: {law.warning}"]
     if not joint.radius:
         return found  # the end of a coordinate has no surfaces
-    surfaces = lookup("flexclear.dynamics.contact.surfaces", joint.type, where=name)
+    surfaces = SURFACES[joint.type]
     size = surfaces.contact_size(joint, depth, force)
     if joint.normal.stiffness is None and size > SMALL_CONTACT * joint.radius:
         found.append(

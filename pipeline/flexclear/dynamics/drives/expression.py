@@ -14,7 +14,6 @@ from functools import reduce
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
 from flexclear.dynamics.drives.pieces import Piece, Pieces, Terms
 from flexclear.scene.expression import BENT, JUMPING, check_unit, fold
@@ -104,6 +103,8 @@ def _split(switch: Course, above: Course, below: Course, span: tuple[float, floa
 
 def _roots(piece: Piece, start: float, end: float) -> list[float]:
     """Return the times strictly between start and end at which a piece changes its sign."""
+    from scipy.optimize import brentq  # here, since few laws need it
+
     fastest = max((abs(w) for _, w, _ in piece.terms), default=0.0)
     count = FEWEST_SAMPLES + PER_PERIOD * fastest * (end - start) / (2.0 * math.pi)
     if count > MOST_SAMPLES:

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexclear.scene.laws import COEFFICIENTS
-from flexclear.scene.registry import lookup
 
 PACKAGE = "flexclear.dynamics.drives"
 #: times at which a piece is evaluated for its size; enough for polynomials of degree 7
@@ -114,7 +113,9 @@ class Pieces:
 
 def pieces_of(law: object, dimension: str) -> Pieces:
     """Return the pieces of any law; raise ValueError, in words, for values of another dimension."""
-    result: Pieces = lookup(PACKAGE, law.type, where="law")(law, dimension)  # type: ignore[attr-defined]
+    from flexclear.dynamics.drives import LAWS  # here, since laws consist of laws
+
+    result: Pieces = LAWS[law.type](law, dimension)  # type: ignore[attr-defined]
     return result
 
 

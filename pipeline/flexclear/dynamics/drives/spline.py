@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
 from flexclear.dynamics.drives.pieces import Pieces, polynomials
 from flexclear.scene.laws import Ends, Spline
@@ -23,6 +22,8 @@ def pieces(law: Spline, dimension: str) -> Pieces:
 
 def through(time: Sequence[float], value: Sequence[float], degree: int, ends: Ends) -> Pieces:
     """Return the spline through the points; raise ValueError when periodic ends differ in value."""
+    from scipy.interpolate import CubicSpline, PPoly, make_interp_spline  # here, since few laws need it
+
     if ends == "periodic" and value[0] != value[-1]:
         raise ValueError("a periodic spline must end with its first value")
     t, x = np.asarray(time, dtype=float), np.asarray(value, dtype=float)

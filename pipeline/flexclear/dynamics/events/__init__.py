@@ -4,6 +4,3 @@ A phase ends where an event happens. The next one begins in that state with the 
 part, with a coordinate held, or with a part exchanged. One dataset records all phases.
 Only scenes with events import this package.
 """
-
-KIND = "runner"
-NAMES = {"phases": "phases:simulated"}

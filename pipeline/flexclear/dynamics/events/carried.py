@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects import LOADS
-from flexclear.dynamics.effects.stops.model import End
 from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.loads import LOADS
 from flexclear.dynamics.model.driving import coordinate_of, joint_type, named_coordinate
 from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.model.stops import End
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import NO_IMPACT
 from flexclear.scene.formulas import formula
-from flexclear.scene.registry import lookup
 from flexclear.scene.schema import Scene
 
 #: first part of the key of a counted angle, before the coordinate's name in records
@@ -105,4 +104,4 @@ def _states(scene: Scene, name: str) -> int:
     """Return the number of internal states of a load, without turns."""
     load: Any = scene.load[name]
     given = [one[1] for one in _coordinates(scene, name) if one is not None]
-    return int(lookup(LOADS, load.type, where="[load]").row(load, "", *given).states)
+    return int(LOADS[load.type].row(load, "", *given).states)

@@ -1,5 +1,5 @@
-"""Joint types. To add one: a module here named like the type, and that type in scene/parts; the family tests
-include it automatically.
+"""Joint types. To add one: a module here, a line in the table, and that type in scene/parts; the family tests include
+it automatically.
 
 Each is a module, or an object of `turn_and_slide`, with the kernels
 - ``motion(w, x, u, S) -> R_FG, p_FG, bias``: pose of the second frame in the first, motion subspace and bias
@@ -15,13 +15,20 @@ and with
 - ``coordinates(R, p)``: joint positions of a relative pose, for the start pose.
 """
 
-from flexclear.scene.parts import IDEAL
-from flexclear.scene.registry import module_name
+from __future__ import annotations
 
-KIND = "joint type"
-#: prescribed paths alone create a joint type that no scene can name, the rotation vector
-NAMES = {name: module_name(name) for name in (*IDEAL, "rotation-vector")}
-NAMES |= {n: f"turn_and_slide:{n.upper()}" for n in ("fixed", "revolute", "prismatic", "cylindrical", "slot", "planar")}
-#: joints that are always one link; others may become chains of joints in CHAIN (see `model.chain`)
-WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
-CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
+from flexclear.dynamics.joints import free, rotation_vector, spherical, turn_and_slide, universal
+
+#: by type; prescribed paths alone create a joint that no scene can name, the rotation vector
+JOINTS = {
+    "spherical": spherical,
+    "revolute": turn_and_slide.REVOLUTE,
+    "universal": universal,
+    "prismatic": turn_and_slide.PRISMATIC,
+    "cylindrical": turn_and_slide.CYLINDRICAL,
+    "slot": turn_and_slide.SLOT,
+    "planar": turn_and_slide.PLANAR,
+    "fixed": turn_and_slide.FIXED,
+    "free": free,
+    "rotation-vector": rotation_vector,
+}

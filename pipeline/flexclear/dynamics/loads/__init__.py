@@ -1,20 +1,40 @@
-"""Loads. To add one: a module here named like its type, and its parameters in scene/loads. A load whose effect
-needs more, such as states between steps, is in the effect's folder.
+"""Loads. To add one: a module here, a line in the table, and its parameters in scene/loads.
 
-Each module except that of gravity, which is a field, has
+Each module has
 
 - ``row(load, place)`` or, on a joint coordinate, ``row(load, place, coordinate)``: the row of the load (see `row.Row`);
   raises ValueError, in words, for invalid values;
 - ``apply(d, k)``: kernel that applies load k by `fields.act`.
 """
 
-from flexclear.scene.loads import KINDS
-from flexclear.scene.registry import declared
+from __future__ import annotations
 
-KIND = "load"
-NAMES = declared(KINDS) | {
-    "gravity": "gravity:field",
-    "bushing": ".effects.bushings.bushing",
-    "pid": ".effects.controllers.pid",
-    "sampled-pid": ".effects.controllers.sampled_pid",
+from flexclear.dynamics.loads import (
+    bushing,
+    joint_expression,
+    joint_force,
+    joint_friction,
+    joint_spring,
+    line_expression,
+    pid,
+    point_expression,
+    point_force,
+    point_torque,
+    sampled_pid,
+    spring_damper,
+)
+
+LOADS = {
+    "point-force": point_force,
+    "point-torque": point_torque,
+    "spring-damper": spring_damper,
+    "joint-force": joint_force,
+    "joint-expression": joint_expression,
+    "line-expression": line_expression,
+    "point-expression": point_expression,
+    "joint-spring": joint_spring,
+    "joint-friction": joint_friction,
+    "bushing": bushing,
+    "pid": pid,
+    "sampled-pid": sampled_pid,
 }

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.wear.contact import LEDGER
+from flexclear.dynamics.contact.wear import LEDGER
 from flexclear.dynamics.mechanics.contacts import stop, touch
 from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.loads import STATES, Law, act
@@ -41,6 +41,7 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
         )
         books = cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
         results, form = [*tables.row(m.NAMED["touch"], c), *books], parts.forms[row["normal"]]
+        given: tuple[Any, ...]
         if c < tables.size(m.N_SURFACES):
             if c in worn:
                 results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)

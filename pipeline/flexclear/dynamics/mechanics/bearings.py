@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import Any, NamedTuple
 
-from flexclear.dynamics.effects.joint_friction.bearings import BALL, PIN, SLIDER
+from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
 from flexclear.dynamics.mechanics.contacts import rub
 from flexclear.dynamics.mechanics.surfaces import across
 from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, carried, on_both
@@ -64,7 +64,7 @@ def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, 
         unit = Wrench(numbers.radius * (F.R_WB @ force), ZERO)
     else:
         unit = Wrench((numbers.radius * force[1]) * n, force[0] * n)
-    return (slip, rate if bristle else ()), on_both(a, b, G, unit), unit, -dot(force, slip), R
+    return (slip, rate if bristle else ()), on_both((a, b), G, unit), unit, -dot(force, slip), R
 
 
 @routine

@@ -3,7 +3,7 @@ r"""Elastic mounts: force and torque from six displacements s of a frame G in th
 .. math:: s = (x, \theta), \quad R_{FG} = \exp\tilde\theta, \quad \omega = T\dot\theta, \quad
           T^{-1} = 1 - \tfrac12\tilde\theta + e\,\tilde\theta\tilde\theta
 
-The force is -(K s + C ds/dt) along x, the torque T^-T times that along theta (`effects.bushings.bushing`).
+The force is -(K s + C ds/dt) along x, the torque T^-T times that along theta (`loads.bushing`).
 Source: Bauchau (2011), Flexible Multibody Dynamics, sec. 13.3.
 """
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexclear.dynamics.effects.bushings.bushing import continued, rotation_vector, tangent_part
+from flexclear.dynamics.loads.bushing import continued, rotation_vector, tangent_part
 from flexclear.dynamics.mechanics.trees import Motion, Numbers
 from flexclear.dynamics.mechanics.vectors import Vector, Wrench, cross
 from flexclear.dynamics.routines.symbols import shared

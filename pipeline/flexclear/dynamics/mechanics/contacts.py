@@ -12,14 +12,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexclear.dynamics.effects import FORMS, FRICTION_LAWS
+from flexclear.dynamics.contact.form import FORMS
+from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.mechanics.coordinates import along
 from flexclear.dynamics.mechanics.surfaces import SURFACES, across
 from flexclear.dynamics.mechanics.trees import End, Numbers, carried, moving, on_both
 from flexclear.dynamics.mechanics.vectors import ZERO, Vector, Wrench, cross, dot
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.routines.symbols import branch, larger, shared, sqrt
-from flexclear.scene.registry import lookup
 
 
 def push(form: str, numbers: Any, depth: Any, approach: Any, latched: Any) -> tuple[Any, Any, Any]:
@@ -27,7 +27,7 @@ def push(form: str, numbers: Any, depth: Any, approach: Any, latched: Any) -> tu
 
     depth: penetration.  latched: the rate at which this contact began.
     """
-    law, depth = lookup(FORMS, form, where="contact"), larger(0.0, depth)
+    law, depth = FORMS[form], larger(0.0, depth)
     elastic, damping = shared(law.force)(depth, approach, larger(latched, numbers.floor), numbers)
     return larger(0.0, elastic + damping), damping * approach, shared(law.stored)(depth, numbers)
 
@@ -37,8 +37,7 @@ def rub(law: str, numbers: Numbers, bristle: Numbers, slip: Vector, N: Any) -> t
     store, and their rate; slip: sliding velocity."""
     if not law:
         return ZERO, 0.0, 0.0, ZERO
-    traction = shared(lookup(FRICTION_LAWS, law, where="contact").traction)
-    force, lost, bent, rate = traction(bristle or ZERO, slip, N, numbers)
+    force, lost, bent, rate = shared(FRICTION_LAWS[law].traction)(bristle or ZERO, slip, N, numbers)
     return Vector(force), lost, bent, Vector(rate)
 
 
@@ -77,7 +76,7 @@ def touch(
     apart = (0.0,) * 6, ZERO, ZERO, (0.0,) * 5, ZERO
     read, F, Q, books, rate = branch(closed == 1, forces, lambda: apart)
     stored = gap, approach, read, F, A.R_WB.T @ offset, Q, books[: 5 if worn else 3], rate if bristle else ()
-    return stored, on_both(*ends, B, Wrench(cross(Q - B.p_WB, F), F)), ()
+    return stored, on_both(ends, B, Wrench(cross(Q - B.p_WB, F), F)), ()
 
 
 @routine
@@ -92,4 +91,4 @@ def stop(form: str, gauge: Any, numbers: Any, closed: Any, latched: Any, turns: 
     wrench = unit * (-sense * N)
     force = wrench.moment if gauge.turning else wrench.force
     read = gap, approach, (N, 0.0, taken, stored, 0.0, 0.0), force, (numbers.clearance - gap, 0.0, 0.0), ZERO
-    return (read, (taken, 0.0, N), [rate for _ in turns]), on_both(*ends, G, wrench), ()
+    return (read, (taken, 0.0, N), [rate for _ in turns]), on_both(ends, G, wrench), ()

@@ -21,5 +21,5 @@ def coupling(gauges: Sequence[Any], turns: Sequence[Numbers], numbers: Any, kept
     residual, rate = second.value - r * first.value - numbers.offset, second.rate - r * first.rate
     turning = [one.rate for one, before in zip((second, first), turns, strict=True) for _ in before]
     gamma = r * bias(gauges[1], F1, G1) - bias(gauges[0], F2, G2)
-    wrenches = *on_both(*ends[:2], G2, second.unit), *on_both(*ends[2:], G1, first.unit * -r)
+    wrenches = *on_both(ends[:2], G2, second.unit), *on_both(ends[2:], G1, first.unit * -r)
     return [residual, rate, *turning], [gamma][:kept], *([wrench][:kept] for wrench in wrenches)

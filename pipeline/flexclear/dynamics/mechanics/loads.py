@@ -40,7 +40,7 @@ class Given(NamedTuple):
     G: Motion
     R_WL: Matrix
     coordinates: Sequence[Along]
-    read: Sequence[Motion | Along]
+    read: Sequence[Any]
 
 
 class Load(NamedTuple):
@@ -247,4 +247,4 @@ def act(
     given = Given(numbers, laws, states, F, G, R_WL, coordinates, [(frames, coordinates)[sort][k] for sort, k in read])
     load = LOADS[kind[0]](given, *kind[1:])
     turning = [one.rate for one, (_, turns, _, _) in zip(coordinates, gauged, strict=True) if turns]
-    return (load.states, turning, load.bends), on_both(*ends[:2], G, load.wrench), (load.power, load.lost)
+    return (load.states, turning, load.bends), on_both(ends[:2], G, load.wrench), (load.power, load.lost)

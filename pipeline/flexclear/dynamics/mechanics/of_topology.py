@@ -55,7 +55,8 @@ def mechanism_of(tables: Tables) -> Mechanism:
         place(k)
     actions = actions_of(tables, ground, frames)
     closures, rubbing = _closures(tables, frames), rubbing_of(tables, frames, carriers)
-    stored = {cell.key for one in (*actions, *closures) for cell in one.results}
+    results = [*(one.results for one in actions), *(one.results for one in closures)]
+    stored = {cell.key for one in results for cell in one}
     stored |= {cell.key for joint in rubbing for one in joint.bearings for cell in one.sliding}
     books = enumerate(cells(RATES, tables.nq + tables.nv, tables.size(m.N_LEDGER)))
     ledger, (least,) = (
@@ -160,8 +161,8 @@ def _closures(tables: Tables, frames: list[Frame]) -> list[Closure]:
         residuals = [cell for at in (m.RESIDUAL, m.RESIDUAL_RATE) for cell in tables.stretch(at, row0, count)]
         factor, of_joint = (diagonal, roots, scales), (tuple(rows[row0 : row0 + count]),)
         if one["coupling"] >= 0:
-            *how, turning = gear(tables, frames, int(one["coupling"]))
-            made.append(Closure(*how, [*residuals, *turning], *factor))
+            which, given, joined, turning = gear(tables, frames, int(one["coupling"]))
+            made.append(Closure(which, given, joined, [*residuals, *turning], *factor))
         else:
             joined = [frames[one["site_a"]], frames[one["site_b"]]]
             made.append(Closure(closure, of_joint, joined, residuals, *factor))

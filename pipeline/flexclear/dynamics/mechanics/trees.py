@@ -156,8 +156,12 @@ def moving(frame: Motion, p: Vector) -> Vector:
     return frame.v + cross(frame.omega, p - frame.p_WB)
 
 
-def on_both(a: End, b: End, B: Motion, wrench: Wrench) -> tuple[Wrench, Wrench]:
-    """Return a wrench on b about the origin of B, the motion of b's site, and its opposite on a, about their bodies."""
+def on_both(ends: Sequence[End], B: Motion, wrench: Wrench) -> tuple[Wrench, Wrench]:
+    """Return the opposite of a wrench on the first of two bodies, and that on the second one, about their origins.
+
+    wrench: about the site on the second one, whose motion is B.
+    """
+    a, b = ends
     return (wrench * -1.0).about(B.p_WB - a[0].p_WB), wrench.about(b[0].R_WB @ b[1].p_BS)
 
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexclear.dynamics.drives.pieces import Pieces
-from flexclear.dynamics.effects import way
-from flexclear.dynamics.model import given_start
+from flexclear.dynamics.model import fitting, given_start
 from flexclear.dynamics.model.chain import path_positions
 from flexclear.dynamics.model.closing import CLOSED_EXACTLY, close, ill_fitting, misfit, opposite
 from flexclear.dynamics.model.constraints import Constraint, constraints
@@ -80,8 +79,10 @@ def _fitted(
 
     near: as in `fitting.fitted`.
     """
-    fitting = way(mechanism.scene, "frames to a tolerance")
-    other: Mechanism | None = fitting.fitted(mechanism, joints, near) if fitting is not None else None
+    scene = mechanism.scene
+    # plans make bodies with recipes rigid, whose frames are then as exact as the mesh has them
+    tolerant = scene.recipes() or any(body.frame_tolerance for body in scene.rigid().values())
+    other = fitting.fitted(mechanism, joints, near) if tolerant else None
     if other is None:
         return None
     fits = assembled(other, given, exact=True)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from flexclear.dynamics.effects.gears.model import coordinates_and_ratio, couplings
-from flexclear.dynamics.effects.stops.model import ends
 from flexclear.dynamics.model import contacts
 from flexclear.dynamics.model.driving import joint_drives, named_coordinate
+from flexclear.dynamics.model.gears import coordinates_and_ratio, couplings
 from flexclear.dynamics.model.laws import NO_LAWS, drive_laws
 from flexclear.dynamics.model.loads import acting_frames, describe
 from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.start_table import given_coordinates
+from flexclear.dynamics.model.stops import ends
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.schema import Scene, Sections
 from flexclear.system.errors import InputError, errors_from

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects import FRICTION_LAWS, NORMAL_LAWS, SURFACES, Parts
-from flexclear.dynamics.effects.stops.model import End, ends_an_angle
+from flexclear.dynamics.contact.friction import FRICTION_LAWS
+from flexclear.dynamics.contact.normal import NORMAL_LAWS
+from flexclear.dynamics.contact.surfaces import SURFACES
+from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.model.components import Floors, Group
 from flexclear.dynamics.model.gauges import Gauges
 from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.numbering import Numbering
+from flexclear.dynamics.model.stops import End, ends_an_angle
 from flexclear.scene.clearance import Clearance
-from flexclear.scene.registry import lookup
 from flexclear.system.errors import InputError, together
 
 if TYPE_CHECKING:
@@ -48,7 +50,7 @@ def fill(
         length = mechanism.components.lengths[part_of(mechanism, contact)]
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
         if joint.friction is not None:
-            friction = friction_law(name, joint)
+            friction = friction_law(joint)
             friction_kind = parts.frictions.index(joint.friction.law)
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
         if isinstance(joint, End):
@@ -87,16 +89,16 @@ def _floor(joint: Clearance | End, length: float) -> float:
     return LEAST_RATE if ends_an_angle(joint) else min(LEAST_RATE, SLOW_IMPACT * length)
 
 
-def friction_law(name: str, joint: Any) -> Any:
+def friction_law(joint: Any) -> Any:
     """Return the friction law of a joint with friction."""
-    return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
+    return FRICTION_LAWS[joint.friction.law]
 
 
 def bristle(name: str, joint: Any) -> float | None:
     """Return the size of the bristles of a joint's friction [m]; None for a law without bristles."""
     if joint.friction is None:
         return None
-    size: float | None = friction_law(name, joint).bristle(joint.friction)
+    size: float | None = friction_law(joint).bristle(joint.friction)
     return size
 
 
@@ -115,8 +117,8 @@ def resolved(joint: Clearance | End, mass: float | None, path: str) -> Resolved:
     normal, stiffness = joint.normal, joint.normal.stiffness
     try:
         if not isinstance(joint, End):
-            stiffness = lookup(SURFACES, joint.type, where=path).stiffness(joint, normal.exponent)
-        law: Resolved = lookup(NORMAL_LAWS, normal.law, where=path)(normal, stiffness, mass)
+            stiffness = SURFACES[joint.type].stiffness(joint, normal.exponent)
+        law: Resolved = NORMAL_LAWS[normal.law](normal, stiffness, mass)
     except ValueError as error:
         raise InputError(path, str(error)) from None
     return law

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
-from flexclear.dynamics.effects import JOINTS
+from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.drives import PathDrive
-from flexclear.scene.registry import lookup, suggestion
+from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError, together
 
@@ -28,7 +28,7 @@ class Prescribed:
 @cache
 def joint_type(kind: str) -> Any:
     """Return the declaration of a joint type; cached: building a mechanism needs it some hundred times per link."""
-    return lookup(JOINTS, kind, where="joint")
+    return JOINTS[kind]
 
 
 def label(joint: str, kind: str, k: int) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Any
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.model.contacts import friction_law
 from flexclear.dynamics.model.loads import Loaded
 from flexclear.dynamics.model.mechanism import Mechanism
@@ -15,9 +14,8 @@ from flexclear.dynamics.model.mechanism import Mechanism
 Guard = tuple[tuple[int, ...], float, float]
 
 
-def fill(mechanism: Mechanism, parts: Parts, loaded: Loaded) -> dict[Any, Any]:
+def fill(mechanism: Mechanism, of_effects: list[Guard], loaded: Loaded) -> dict[Any, Any]:
     """Return the tables GUARDS and GUARD_NUMBERS."""
-    of_effects = [guard for made in parts.functions("guards") for guard in made(mechanism)]
     guards = [*_of_contacts(mechanism), *of_effects, *_of_loads(loaded)]
     return {
         m.GUARDS: [row for row, _, _ in guards],
@@ -33,9 +31,9 @@ def speeds(table: Any, offset: int, count: int, levels: tuple[float, ...], conta
 
 
 def _of_contacts(mechanism: Mechanism) -> Iterator[Guard]:
-    for c, (name, joint, *_) in enumerate(mechanism.contacts):
+    for c, (_, joint, *_) in enumerate(mechanism.contacts):
         if joint.friction is not None:
-            law = friction_law(name, joint)
+            law = friction_law(joint)
             yield from speeds(m.TOUCH, c * m.TOUCH.size + m.TOUCH.slip, 1, law.kinks(joint.friction), c)
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.gears.model import Coupling
 from flexclear.dynamics.model import arrays, flexible_bodies
+from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.mechanism import Closure
 from flexclear.dynamics.model.numbering import Numbering
 

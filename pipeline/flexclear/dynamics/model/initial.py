@@ -9,6 +9,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.model import bushings
 from flexclear.dynamics.model.assembly import chain_positions
 from flexclear.dynamics.model.constraints import outboard_place
 from flexclear.dynamics.model.driving import joint_type
@@ -24,6 +25,8 @@ from flexclear.system.errors import InputError
 #: closures, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
+#: of effects: their internal states that follow from the frames of sites
+STATES = {"bushings": bushings.rotations}
 #: errors below this fraction of the requested speeds are rounding
 RIGID = 1e-9
 #: errors of given velocities below this fraction of the speeds come from the digits with which they were written
@@ -374,6 +377,6 @@ def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray
 def of_effects(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
     """Return the internal states of effects from all sites' frames and previous states, by the index of the first."""
     states = dict[int, np.ndarray]()
-    for follow in model.parts.functions("states"):
+    for follow in model.parts.functions(STATES):
         states |= follow(model, sites, internal)
     return states

@@ -11,8 +11,10 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Pieces
-from flexclear.dynamics.effects import LOADS, load_kind
+from flexclear.dynamics.effects import load_kind
 from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.loads import LOADS
+from flexclear.dynamics.loads.gravity import field as gravity_field
 from flexclear.dynamics.loads.row import Row
 from flexclear.dynamics.model.driving import coordinate_of, named_coordinate
 from flexclear.dynamics.model.gauges import Gauges
@@ -21,7 +23,6 @@ from flexclear.dynamics.model.mechanism import Mechanism, Site
 from flexclear.dynamics.model.merge import Placement, find_frame
 from flexclear.dynamics.model.numbering import Numbering
 from flexclear.scene.formulas import formula
-from flexclear.scene.registry import lookup
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError, together
 
@@ -53,8 +54,7 @@ def gravity(scene: Scene) -> np.ndarray:
     """Return the sum of the scene's gravity fields [m/s^2], shape (3,)."""
     if len(scene.forces()) == len(scene.load):
         return np.zeros(3)
-    field: np.ndarray = lookup(LOADS, "gravity", where="[load]")(scene)
-    return field
+    return gravity_field(scene)
 
 
 def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: Mapping[str, Pieces]) -> Loaded:
@@ -124,7 +124,7 @@ def describe(scene: Scene, name: str, given: Mapping[str, Pieces] = NO_LAWS) -> 
     """Return the description of a load; raise InputError for one that cannot exist.  given: as in `model.tabulate`."""
     load: Any = scene.load[name]
     path = f"[load.{name}]"
-    part = lookup(LOADS, load.type, where=path)
+    part = LOADS[load.type]
     coordinate: Coordinate | None = None
     measured: tuple[str, Coordinate] | None = None
     if hasattr(load, "joint"):

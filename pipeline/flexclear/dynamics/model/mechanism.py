@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexclear.dynamics.effects.stops.model import End, ends
 from flexclear.dynamics.model.chain import InboardJoint, chain, path_pose
 from flexclear.dynamics.model.components import Components, components, joined
 from flexclear.dynamics.model.driving import joint_type, prescribed
@@ -26,6 +25,7 @@ from flexclear.dynamics.model.merge import (
     start_places,
 )
 from flexclear.dynamics.model.start_table import given_modes
+from flexclear.dynamics.model.stops import End, ends
 from flexclear.dynamics.model.tree import PATH, Branch, Edge, edges, span
 from flexclear.scene.clearance import Clearance
 from flexclear.scene.drives import PathDrive

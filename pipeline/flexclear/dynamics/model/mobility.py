@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.gears.model import Coupling
 from flexclear.dynamics.model.assembly import with_starts
 from flexclear.dynamics.model.closing import LEAST_GYRATION, close
 from flexclear.dynamics.model.constraints import constraints
+from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.rates import Rates, motions, rates, row_axes

@@ -11,18 +11,18 @@ import numpy as np
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Pieces
 from flexclear.dynamics.effects import Parts, most_parts
-from flexclear.dynamics.effects.gears.model import Coupling, couplings
-from flexclear.dynamics.effects.stops.model import End
 from flexclear.dynamics.model import contacts as contacting
-from flexclear.dynamics.model import filling, flexible_bodies, guards, index_tables, laws
+from flexclear.dynamics.model import filling, flexible_bodies, guards, index_tables, laws, of_effects
 from flexclear.dynamics.model import loads as loading
 from flexclear.dynamics.model.arrays import Arrays, pack
 from flexclear.dynamics.model.assembly import assembled
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.gauges import Gauges
+from flexclear.dynamics.model.gears import Coupling, couplings
 from flexclear.dynamics.model.loads import Load
 from flexclear.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
 from flexclear.dynamics.model.numbering import Numbering, number
+from flexclear.dynamics.model.stops import End
 from flexclear.scene.parts import RigidBody
 from flexclear.scene.schema import Scene
 
@@ -109,7 +109,7 @@ def filled(
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
     gravity, components = loading.gravity(mechanism.scene), mechanism.components
     parts = _parts(numbering, normals, any(law.harmonics.any() for law in [*drive_laws, *loaded.laws]))
-    slots = filling.slots(mechanism, parts)
+    slots = of_effects.slots(mechanism, parts)
     books = _books(slots)
     tables = {
         m.LINK_NUMBERS: [_link_numbers(*one) for one in zip(mechanism.links, _borne(mechanism), strict=True)],
@@ -117,8 +117,8 @@ def filled(
         **laws.fill([*in_tree, *loaded.laws]),
         **loaded.tables,
         m.LOADS: _booked(mechanism, loaded, books),
-        **filling.tables(filling.Filling(numbering, parts, ordered, gauges, slots)),
-        **guards.fill(mechanism, parts, loaded),
+        **of_effects.tables(filling.Filling(numbering, parts, ordered, gauges, slots)),
+        **guards.fill(mechanism, of_effects.guards(mechanism, parts), loaded),
         **_recorded(mechanism),
         m.GAUGES: gauges.rows,
         m.GRAVITY: gravity,
@@ -278,7 +278,7 @@ Books = list[Book]
 
 def _books(slots: Mapping[str, int]) -> Books:
     """Return the ledger indices of the energy sums of each independent mechanism."""
-    others = range(slots["books"], slots["end"], filling.OTHER_BOOKS)
+    others = range(slots["books"], slots["end"], of_effects.OTHER_BOOKS)
     return [Book(m.DRIVE_WORK, m.MODAL_LOSS, slots["loads"]), *(Book(k, k + 1, k + 2) for k in others)]
 
 
@@ -336,7 +336,7 @@ def _floors(
                 rows.append((lengths[of_link[i]] * link.mass**0.5, of_link[i]))
                 target[mine] = len(rows) - 1
     groups = [*q_group, *v_group]
-    tail = [group for block in filling.blocks(mechanism, parts, energies, lengths).values() for group in block]
+    tail = [group for block in of_effects.blocks(mechanism, parts, energies, lengths).values() for group in block]
     acting = ([numbering.sites[site].link for site in sites if site >= 0] for sites in gauges.owners)  # -1: the world
     tail += [(1.0, 1, mechanism.components.of(*links)) for links in acting]
     for floor, count, part in tail:

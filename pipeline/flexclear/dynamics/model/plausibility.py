@@ -9,13 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexclear.dynamics.effects import SURFACES
-from flexclear.dynamics.effects.stops.model import End
+from flexclear.dynamics.contact.surfaces import SURFACES
 from flexclear.dynamics.model.flexible_bodies import start_place
 from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.merge import Placement
+from flexclear.dynamics.model.stops import End
 from flexclear.scene.loads import Gravity, SpringDamper
-from flexclear.scene.registry import lookup
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import loose
 from flexclear.system.errors import InputError, errors_from
@@ -51,7 +50,7 @@ def separations(mechanism: Mechanism) -> Iterator[Separation]:
             beyond = joint.coordinate.value(outer, inner) - joint.limit
             yield Separation(contact, joint.sense * beyond, np.zeros(3), inner)
         else:
-            surfaces = lookup(SURFACES, joint.type, where=contact.place)
+            surfaces = SURFACES[joint.type]
             gap, *_, offset = surfaces.separation(outer.R.ravel(), joint, inner.p - outer.p, np.zeros(3))
             yield Separation(contact, -float(gap), np.array(offset), inner)
 

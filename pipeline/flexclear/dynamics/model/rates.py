@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.gears.model import Coupling
 from flexclear.dynamics.model.constraints import demands, freedoms, outboard_place
+from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.index_tables import closure_route, uncommon
 from flexclear.dynamics.model.interface_basis import frame_index
 from flexclear.dynamics.model.mechanism import Closure, Site

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Iterator
 from functools import partial
-from importlib import import_module
 
 import numpy as np
 
@@ -13,12 +12,13 @@ from flexclear.artifacts import quantities
 from flexclear.artifacts.coordinates import motion
 from flexclear.artifacts.labelled import LabelledArrays, labelled
 from flexclear.artifacts.schema import RUN, conformed
-from flexclear.dynamics.effects import RECORDS, named
-from flexclear.dynamics.effects.stops.model import ends_an_angle
+from flexclear.dynamics.effects.citations import references
 from flexclear.dynamics.equations.observation import Observed, Series, Variables
 from flexclear.dynamics.model.driving import prescribed
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import doubts
+from flexclear.dynamics.model.stops import ends_an_angle
+from flexclear.dynamics.record import bushings, controllers, gears, joint_friction, stress, wear
 from flexclear.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.dynamics.record.topology import topology
 from flexclear.dynamics.record.wrenches import every_joint_wrench, held_moments
@@ -26,11 +26,9 @@ from flexclear.dynamics.run import ledger
 from flexclear.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.dynamics.run.run import Run
 from flexclear.dynamics.run.trajectory import Trajectory
-from flexclear.scene.citations import cited, docstring
 from flexclear.scene.event_kinds import EVENT_KINDS
 from flexclear.scene.output import VARIABLES
 from flexclear.scene.quantity import KINDS, Quantity
-from flexclear.scene.registry import lookup
 from flexclear.scene.schema import Scene
 from flexclear.workflow.fingerprint import library_version
 
@@ -83,6 +81,18 @@ def series(scene: Scene, motions: Motions, requested: Collection[Quantity], time
     return {one.name: quantities.series(arrays, one) for one in requested}
 
 
+#: of effects: variables and coordinates of the dataset, by beginnings of the variables' names
+RECORDS = {
+    "gears": (("gear_",), gears.gear_series),
+    "bushings": (("bushing_",), bushings.bushing_series),
+    "controllers": (("controller_",), controllers.controller_series),
+    "joint_friction": (("joint_bearing", "joint_sliding", "joint_friction_"), joint_friction.friction_series),
+    "wear": (("wear_",), wear.wear_series),
+}
+#: of effects: warnings about the results of a run
+WARNINGS = {"joint_friction": joint_friction.warnings}
+#: variables that a scene's ``[output]`` requests, by its key
+ON_REQUEST = {"stress": stress.record}
 #: beginnings of the names of the ledger's variables
 _LEDGER = (
     *("kinetic", "potential", "elastic", "dissipated", "drive_work", "energy_error", "constraint_error", "load_work"),
@@ -100,13 +110,13 @@ def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], C
     if model.loads:
         yield ("load_",), lambda: _loads(model, seen)
     for effect in model.parts.present:
-        for beginnings, function in effect.records.items():
-            yield beginnings, partial(effect.load(function), model, seen)
+        if effect.name in RECORDS:
+            beginnings, function = RECORDS[effect.name]
+            yield beginnings, partial(function, model, seen)
     if model.contacts:
         yield ("contact_",), lambda: _contacts(model, seen)
     for name, asked in scene.output.requests().items():
-        record = lookup(RECORDS, name, where="[output]")
-        yield tuple(VARIABLES[name]), partial(record, motions, asked)
+        yield tuple(VARIABLES[name]), partial(ON_REQUEST[name], motions, asked)
     yield _LEDGER, lambda: (ledger.series(model, seen), {})
 
 
@@ -118,17 +128,6 @@ def subject(scene: Scene) -> str:
     for what, names in (("flexible", list(scene.flexible())), ("clearance", list(scene.contacts()))):
         words += f"; {what}: {', '.join(names)}" if names else ""
     return words
-
-
-def references(scene: Scene) -> str:
-    """Return the publications of the methods that the scene's parts represent, one a line."""
-    sources = list[str]()
-    for name in sorted(named(scene)):
-        module = import_module(name)
-        own = [thing for thing in vars(module).values() if getattr(thing, "__module__", None) == name]
-        for thing in (module, *own):
-            sources += cited(docstring(thing))
-    return "\n".join(dict.fromkeys(sources))
 
 
 def attributes(scene: Scene) -> dict[str, str]:
@@ -155,7 +154,7 @@ def warnings(run: Run) -> list[str]:
         *run.mended,
         *_contact_warnings(run),
         *_flexible_warnings(run),
-        *(text for warn in run.model.parts.functions("warns") for text in warn(run)),
+        *(text for warn in run.model.parts.functions(WARNINGS) for text in warn(run)),
         *_step_warnings(run.model, run.trajectory),
         *ledger.warnings(run.model, run.judged[1]),
     ]

@@ -12,7 +12,6 @@ import numpy as np
 from flexclear.artifacts import quantities
 from flexclear.artifacts.points import Point, Values
 from flexclear.artifacts.quantities import SAME_TIME, of_impacts, reduced, regular_times
-from flexclear.dynamics.effects import EVENTS
 from flexclear.dynamics.model.checks import section_period
 from flexclear.dynamics.model.contacts import arms
 from flexclear.dynamics.record.dataset import events_of, series, variables_for
@@ -31,7 +30,6 @@ from flexclear.dynamics.run.run import follow, judged, observed, require_shallow
 from flexclear.dynamics.run.trajectory import Trajectory
 from flexclear.scene.load import with_numbers
 from flexclear.scene.quantity import MAGNITUDES, Recorded
-from flexclear.scene.registry import lookup
 from flexclear.scene.schema import Ensemble, Scene, Sections
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress, silent
@@ -128,7 +126,9 @@ class Runner:
         """Return the recorded values of a scene with events, from its whole run."""
         if in_sections(self.recorded) or self.members:
             raise InputError("[event]", "a run with events has neither sections nor members", "record other reductions")
-        run = lookup(EVENTS, "phases", where="[event]")(scene, self.bundles, alive, affordable(scene))
+        from flexclear.dynamics.events import phases  # here, since a point may have phases, which record runs
+
+        run = phases.simulated(scene, self.bundles, alive, affordable(scene))
         time = run["time"].values
         after = np.searchsorted(time, regular_times(scene.time, scene.output) * (1.0 - SAME_TIME))
         values = _values(run, self.recorded, time, np.minimum(after, len(time) - 1))

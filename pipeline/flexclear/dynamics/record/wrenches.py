@@ -7,15 +7,20 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.gears.model import Coupling
 from flexclear.dynamics.equations.observation import Observed
+from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.record import gears, stops
 from flexclear.dynamics.record.motion import Motions
 from flexclear.numerics.rotations import cross
 from flexclear.scene.drives import PathDrive
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
 FrameWrench = tuple[str, np.ndarray, np.ndarray]  #: frame on which a wrench acts, and the wrench
+
+
+#: of effects: frames on which they act, moments and forces
+ACTING = {"gears": gears.on_geared_frames, "stops": stops.on_stopped_frames}
 
 
 def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> dict[str, Wrench]:
@@ -74,7 +79,7 @@ def on_frames(model: Model, seen: Observed, body: str) -> list[FrameWrench]:
         from flexclear.dynamics.record.loads import on_loaded_frames
 
         on_each += on_loaded_frames(model, seen)
-    for on_its_frames in model.parts.functions("acts"):
+    for on_its_frames in model.parts.functions(ACTING):
         on_each += on_its_frames(model, seen)
     return [acting for acting in on_each if model.mechanism.frames[acting[0]].body == body]
 

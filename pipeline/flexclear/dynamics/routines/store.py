@@ -2,7 +2,7 @@
 
 Code of a routine is stored by its content: a tape that another mechanism has as well is compiled once for both. A list
 is stored by the topology from which it was made, so that a process which finds it traces nothing. Both depend on the
-processor, whose folder they are in, on the compiler's release, and on the modules that make them.
+processor, whose folder they are in, on the compiler's release, and on the code that makes them.
 """
 
 from __future__ import annotations
@@ -24,16 +24,10 @@ from flexclear.dynamics.routines.emission import interpreter_text, routine_text
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.workflow.fingerprint import TREE, library_version, sources_of
 
-DYNAMICS = "flexclear.dynamics"
-#: modules that make code of a tape; packages and further modules that make lists
-EMITTING = ("routines.emission", "specialise.code")
-PACKAGES = ("routines", "mechanics", "contact.form", "contact.friction")
-LISTING = (*EMITTING, "memory", "vectors", *(f"specialise.{name}" for name in ("plain", "tape", "topology", "trace")))
-LISTING += ("effects.bushings.bushing", "effects.joint_friction.bearings", "effects.wear.contact")
-LISTING += tuple(
-    f"{package}.{path.stem}"
-    for package in PACKAGES
-    for path in sorted(Path(__file__).parents[1].joinpath(*package.split(".")).glob("*.py"))
+#: what makes lists and their code
+MAKERS = tuple(
+    f"flexclear.dynamics.{name}"
+    for name in ("mechanics", "memory", "routines", "specialise", "contact", "loads", "vectors")
 )
 
 
@@ -76,8 +70,7 @@ class ListInstance:
 def stored(topology: bytes, build: Callable[[], CallList], report: Callable[[str], None]) -> LoadedList:
     """Return the list of a topology, from disk or built; `report` receives a message before routines are compiled."""
     path = (
-        writable(kernel_root(), report)
-        / f"flexclear_routine_list_{_name(LISTING, _interpreter() + topology)}{functions.CODE}"
+        writable(kernel_root(), report) / f"flexclear_routine_list_{_name(_interpreter() + topology)}{functions.CODE}"
     )
     if path not in loaded:
         table = read_checked(path)
@@ -103,7 +96,7 @@ def _table(calls: CallList) -> dict[str, list]:
     """Return a list as numbers: names of the interpreter and its codes, code of each call, and offsets of its runs."""
     number = {id(code): k for k, code in enumerate(calls.codes, start=1)}
     return {
-        "names": [_name(EMITTING, content) for content in (_interpreter(), *(code.digest for code in calls.codes))],
+        "names": [_name(content) for content in (_interpreter(), *(code.digest for code in calls.codes))],
         "codes": [number[id(call.code)] for call in calls.calls],
         "counts": [len(call.offsets) for call in calls.calls],
         "offsets": [offset for call in calls.calls for offset in call.offsets],
@@ -125,11 +118,11 @@ def _interpreter() -> bytes:
 
 
 @cache
-def _made_by(modules: tuple[str, ...]) -> bytes:
-    sources = sources_of(TREE)
-    digests = (getattr(sources.module(f"{DYNAMICS}.{name}"), "digest", "") for name in modules)
-    return " ".join([library_version("llvmlite"), *digests]).encode()
+def _makers() -> bytes:
+    """Return version and digests of all that lists and their code depend on besides their content."""
+    known = sources_of(TREE, kernel_root() / "code.json")
+    return " ".join([library_version("llvmlite"), *map(known.digest, MAKERS)]).encode()
 
 
-def _name(modules: tuple[str, ...], content: bytes) -> str:
-    return hashlib.sha256(_made_by(modules) + content).hexdigest()[:20]
+def _name(content: bytes) -> str:
+    return hashlib.sha256(_makers() + content).hexdigest()[:20]

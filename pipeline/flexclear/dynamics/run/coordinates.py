@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.gears.model import Coupling
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model.driving import joint_type, label
+from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.model import Model
 from flexclear.scene.schema import Scene
 

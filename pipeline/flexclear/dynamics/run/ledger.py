@@ -11,6 +11,8 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.equations.observation import Observed, Variables
 from flexclear.dynamics.model.mechanism import Site
 from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.run import joint_friction
+from flexclear.dynamics.run.controllers import REMEDY, require_controlled
 from flexclear.dynamics.run.trajectory import Trajectory
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.solver import Solver
@@ -19,6 +21,9 @@ from flexclear.system.errors import SolverError
 #: losses of an effect, in the first variables of its block of the ledger [J]: variable of the run's dataset and its
 #: dimension; for each loss its two sites, and its cause in words
 Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
+#: of effects: their losses, and checks that refuse an unusable run
+LOSSES = {"joint_friction": joint_friction.losses}
+REFUSALS = {"controllers": require_controlled}
 #: no contact law is known to a thousandth of its energy; a larger error of a run with adaptive steps has another cause.
 #: Tighter tolerances have a better balance: of three hundred hard cases at rtol 1e-10 (benchmarks/atlas.py) none is off
 #: by 1e-6, unless something is wrong; numerical damping is not distinguished from a fault that soon. Fixed steps serve
@@ -26,16 +31,14 @@ Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
 CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 0.1
 #: speed above which a run diverges [m/s]: a hundredth of that of light, where Newton's mechanics is off by 1e-4
 DIVERGED = 3e6
-#: remedy for an unbounded motion
-REMEDY = "reduce the gain or the period of a controller, or increase the time constant of a load"
 #: steps over many vibrations leave up to half of this in the work of oscillating forces while the drives' speeds change
 LONG_STEPS, LONG_PER_RTOL = 2e-2, 50.0
 
 
 def _of_effects(model: Model) -> list[tuple[int, Losses]]:
     """Return the index in the ledger of each effect's losses."""
-    losing = [effect for effect in model.parts.present if effect.losses]
-    return [(model.arrays.size(m.SIZES[f"{one.name}_slot"]), one.load(one.losses)(model)) for one in losing]
+    losing = [effect.name for effect in model.parts.present if effect.name in LOSSES]
+    return [(model.arrays.size(m.SIZES[f"{name}_slot"]), LOSSES[name](model)) for name in losing]
 
 
 def series(model: Model, seen: Observed, component: int | None = None) -> Variables:
@@ -177,7 +180,7 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchang
     exchanged: energy before it, of a run that continues another one.
     Raises SolverError when the run diverges, or its ledger is off by more than the scene's tolerance.
     """
-    for refuse in model.parts.functions("refuses"):
+    for refuse in model.parts.functions(REFUSALS):
         refuse(model, trajectory, seen)
     _require_bounded(model, trajectory, seen)
     made = balances(model, seen)

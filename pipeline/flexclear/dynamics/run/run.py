@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from importlib import import_module
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Pieces
-from flexclear.dynamics.effects import STARTS, way
 from flexclear.dynamics.equations import observation
 from flexclear.dynamics.equations.observation import Blocks, Observed
 from flexclear.dynamics.model.mechanism import build
@@ -24,11 +22,13 @@ from flexclear.dynamics.run import trajectory as stepping
 from flexclear.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.dynamics.run.evaluation.observation import observe_blocks
 from flexclear.dynamics.run.evaluation.start import consistent_start, mends
+from flexclear.dynamics.run.horizon.horizon import Pair
 from flexclear.dynamics.run.ledger import require_closed
 from flexclear.dynamics.run.progress_rate import Judges, Panel
+from flexclear.dynamics.run.singular_poses import collocation
 from flexclear.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, asked, never
+from flexclear.scene.drives import PathDrive
 from flexclear.scene.load import edited
-from flexclear.scene.registry import lookup, module_of
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError, StoppedError, refuse
 from flexclear.system.progress import Progress
@@ -83,14 +83,18 @@ def placed(scene: Scene) -> Scene:
     """Return the scene with bodies positioned by joints and drives at the begin of the run, if it begins elsewhere."""
     if scene.start is None or scene.start.at is None:
         return scene
-    scene_placed: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
-    return scene_placed
+    from flexclear.dynamics.starts import STARTS  # here, since runs start with runs
+
+    return STARTS[scene.start.at].placed(scene)
 
 
 def driven(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
     """Return the scene whose actuators are driven so that they produce the given paths, and the actuators' laws."""
-    actuated = way(scene, "inverse dynamics")
-    return actuated(scene, bundles, progress) if actuated else (scene, {})
+    if not any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
+        return scene, {}
+    from flexclear.dynamics.run.inverse import actuated  # here, since it imports SciPy
+
+    return actuated(scene, bundles, progress)
 
 
 def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
@@ -100,9 +104,9 @@ def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     """
     if scene.start is None or scene.start.at is None:
         return scene, ""
-    begin = lookup(STARTS, scene.start.at, where="[start.at]")
-    started: tuple[Scene, str] = begin(scene, bundles, progress)
-    return started
+    from flexclear.dynamics.starts import STARTS
+
+    return STARTS[scene.start.at].begin(scene, bundles, progress)
 
 
 def engines(
@@ -178,7 +182,7 @@ def integrate_until_stopped(
 
     if alone or not engine.model.contacts or not scene.output.horizon:
         return seen(*steps(engine, start, progress, ours, asked))
-    pair = way(scene, "horizon")(engine)
+    pair = Pair(engine)
 
     def neighbour(alive: Progress) -> PerturbedRun:
         return pair.perturbed_run(start, lambda mine, y, *text: steps(mine, y, alive, others, *text), alive)
@@ -288,10 +292,9 @@ def _evaluated(engine: Engine, trajectory: Trajectory) -> Observed:
 
 def _limit(engine: Engine, row: np.ndarray, motion: Collocation, lost: bool) -> dict[str, np.ndarray]:
     """Return the outputs around a row next to a singular pose; nothing when the row itself is as accurate."""
-    poses = way(engine.model.scene, "collocation")
-    limit = poses.observe_around(engine, row, motion, poses.CLEAR)
+    limit = collocation.observe_around(engine, row, motion, collocation.CLEAR)
     if limit is None and lost:
-        limit = poses.observe_around(engine, row, motion, poses.NEARLY_CLEAR)
+        limit = collocation.observe_around(engine, row, motion, collocation.NEARLY_CLEAR)
     return limit or {}
 
 
@@ -300,9 +303,8 @@ def _near_singular(
 ) -> Iterator[tuple[int, Collocation]]:
     """Return the indices of rows too close to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
-        blurred = way(engine.model.scene, "collocation").blurred
         engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
         for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
-            if blurred(engine, rows[k]):
+            if collocation.blurred(engine, rows[k]):
                 yield k, motion

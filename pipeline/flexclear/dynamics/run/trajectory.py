@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects import way
 from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
+from flexclear.dynamics.run.controllers import sampler
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import NO_IMPACT, overlapping
@@ -21,6 +21,7 @@ from flexclear.dynamics.run.pieces import Handover, Jumps, Moment, Selections, T
 from flexclear.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.dynamics.run.refusals import refusal
 from flexclear.dynamics.run.refusals.reach import require_shallow
+from flexclear.dynamics.run.singular_poses import beginning, passing
 from flexclear.system.errors import SolverError
 from flexclear.system.progress import Progress
 from flexclear.workflow import stopping
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.singular_poses.collocation import Collocation
     from flexclear.dynamics.run.singular_poses.passing import Pass
 
+#: of effects: makers of the state after a break of the run from the state before
+SAMPLERS = {"controllers": sampler}
 #: evaluations between two checks of the clock and of interrupts
 SLICE = 20_000
 #: initial capacity of the event table
@@ -158,7 +161,7 @@ def integrate(
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     """Return a function that applies the effects' changes of state at a break [s]."""
-    samplers = [make(engine) for make in engine.model.parts.functions("samples")]
+    samplers = [make(engine) for make in engine.model.parts.functions(SAMPLERS)]
     return lambda y, t: reduce(lambda state, sample: sample(state, t), samplers, y)
 
 
@@ -226,7 +229,7 @@ def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     """Store a polynomial out of the singular start for the stepper, and set the speeds of its branch."""
     first = recording.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
-    leaving = way(engine.model.scene, "beginning").start_motion(engine, first.copy())
+    leaving = beginning.start_motion(engine, first.copy())
     leaving.lay(engine)
     first[:] = engine.view(m.Y)
     engine.view(m.PIVOT)[:] = 1.0, 0.0
@@ -318,7 +321,6 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     if engine.mobility.redundant and closure_rows.improve(engine, t, closure_rows.CLEARLY):
         tape.selections.append((t, engine.selected.copy()))
         return True
-    passing = way(engine.model.scene, "passing")
     made, passes = passing.lay_over(engine)
     if made is not None:
         tape.collocations.append(made)
@@ -333,7 +335,7 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
-    return (ahead or way(engine.model.scene, "passing").foresee_at_start(engine)) and _pass_over(engine, tape)
+    return (ahead or passing.foresee_at_start(engine)) and _pass_over(engine, tape)
 
 
 def _hand_over(engine: Engine, tape: Tape) -> Handover:

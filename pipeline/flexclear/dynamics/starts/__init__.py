@@ -1,5 +1,5 @@
-"""Starts of a run, other than the poses of its scene. To add one: a module here, and its name in `Start.at`,
-scene/start.
+"""Starts of a run, other than the poses of its scene. To add one: a module here, a line in the table, and its name in
+`Start.at`, scene/start.
 
 Each module has a function ``begin(scene, bundles, progress) -> (Scene, str)``: the scene with the poses, velocities and
 modal coordinates of that start in place of its own, and `Mechanism.choice` of the mechanism that gave them;
@@ -7,9 +7,8 @@ and ``placed(scene) -> Scene``: the scene whose joints and drives position the b
 builds.
 """
 
-from typing import get_args
+from __future__ import annotations
 
-from flexclear.scene.start import At
+from flexclear.dynamics.starts import equilibrium, ideal
 
-KIND = "start"
-NAMES = {name: f"{name}:begin" for name in get_args(At)}
+STARTS = {"equilibrium": equilibrium, "ideal": ideal}

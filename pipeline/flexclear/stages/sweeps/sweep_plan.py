@@ -22,7 +22,6 @@ from flexclear.scene.design import Axis, Design, design
 from flexclear.scene.limits import check_members, require_scatter
 from flexclear.scene.load import edited, with_numbers
 from flexclear.scene.quantity import Recorded, parse_recorded
-from flexclear.scene.registry import module_of
 from flexclear.scene.schema import Scene, Sections
 from flexclear.scene.sweep import Sweep
 from flexclear.stages import simulation
@@ -272,7 +271,6 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
     graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
     outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
     check(outcome)
-    modules = _modules(requested)
     families = {}
     for text, graph in graphs.items():
         records = {name: outcome.records[task] for name, task in graph.simulate.inputs.items()}
@@ -288,7 +286,7 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
                 "members": requested.sweep.members or 0,
                 "error": requested.sweep.error,
             },
-            modules=modules,
+            code=simulation.CODE,
         )
         given = facts(task, {name: record.digest for name, record in records.items()}, workplace.sources)
         inputs = {name: workplace.store.load(record) for name, record in records.items()}
@@ -312,18 +310,6 @@ def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]
     bodies = tuple(f"body.{name}." for name in scene.recipes())
     mine = {where: value for where, value in point.items() if where.startswith(bodies)} if bodies else {}
     return json.dumps(mine, sort_keys=True, default=str), mine
-
-
-def _modules(requested: Plan) -> tuple[str, ...]:
-    """Return the modules that any point reaches by the names of its parts: values that are text may name others.
-
-    A number may require a module, too: a tolerance of frames requires the module that fits them.
-    """
-    fitting = module_of("flexclear.dynamics.run", "frames to a tolerance")
-    modules = {*simulation.modules(requested.scene), fitting}
-    for _, scene in _worded(requested.scene, requested.design):
-        modules |= set(simulation.modules(scene))
-    return tuple(sorted(modules))
 
 
 def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ quadratic parts of :math:`\Gamma` and on the fibres: this is the load's geometri
 second-order motion of the loaded points, held at one frame.
 
 Twist and bending couple in the elastic energy of :math:`\kappa`, whose bending the twisted section resists in its own
-axes (`effects.stiffening.bodies`). So the rod's inertia across its axis is complete, and a cantilever buckles sideways
+axes (`bodies.stiffening`). So the rod's inertia across its axis is complete, and a cantilever buckles sideways
 by the moments of its own bending. The twisted section's axes for shear are those before the twist.
 
 Source: Wallrapp & Schwertassek (1991), International Journal for Numerical Methods in Engineering 32, 1833-1850; Simo

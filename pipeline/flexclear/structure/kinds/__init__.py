@@ -1,6 +1,6 @@
 """Kinds of flexible bodies, by their recipe; each turns recipes into meshes and meshes into models.
 
-To add one: a module here with ``KIND: Kind``, and its shapes below.
+To add one: a module here with ``KIND: Kind``, a line in `kind.KINDS`, and its shapes below.
 """
 
 from __future__ import annotations
@@ -8,12 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-KIND = "kind of body"
-NAMES = {
-    "beam": "beam:KIND",
-    "solid": "solid:KIND",
-    "matrices": "matrices:KIND",
-}
+#: kinds whose stresses are known (`structure.stress`)
+STRESSED = {"beam": True, "solid": True}
 #: kind of body by `shape.type` of its recipe; every other type is a beam
 SHAPES = {
     "cylinder": "solid",

@@ -1,52 +1,20 @@
-"""Interface that each kind of body implements for the stages."""
+"""Meshes and models by the kind of body."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from flexclear.scene.registry import lookup
-from flexclear.structure.fe.model import Interface, Model, SecondOrder
 from flexclear.structure.fe.recipe import parse
-from flexclear.structure.kinds import name_of
-from flexclear.system.errors import InputError
+from flexclear.structure.kinds import beam, matrices, name_of, solid
+from flexclear.structure.kinds.interface import Kind
 
-FAMILY = "flexclear.structure.kinds"
+KINDS = {"beam": beam.KIND, "solid": solid.KIND, "matrices": matrices.KIND}
 #: name of a recipe in messages, where the caller has no better one
 PLACE = "mesh recipe"
-
-
-def no_stresses(mesh: xr.Dataset, model: Model, vectors: np.ndarray, stiffening: bool, held: Interface | None) -> None:
-    """Return None: the stresses of the body are unknown; raise InputError where they are needed."""
-    if stiffening:
-        raise InputError("[body] stiffening", "matrices do not give the stresses of a body", "remove stiffening")
-
-
-@dataclass(frozen=True)
-class Kind:
-    """Functions of one kind of body.
-
-    build: the mesh dataset, from the recipe, the folder that its paths are relative to, and its name in messages.
-    vtu: a VTU file of the mesh dataset, for ParaView.
-    assemble: the model of the mesh dataset.
-    words: one word for the motion of each mode, from its family and vectors of shape (ndof, n).
-    exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
-        families and the interfaces' names; None for kinds without any.
-    second_order: second-order motion of vectors (ndof, n) that follows from stresses: without stiffening by forces and
-        accelerations (False), or with it, held at an interface, if any; None where it has no such part.
-    """
-
-    build: Callable[[Any, Path, str], xr.Dataset]
-    vtu: Callable[[xr.Dataset], bytes]
-    assemble: Callable[[xr.Dataset], Model]
-    words: Callable[[Model, list[str], np.ndarray], list[str]]
-    exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] | None = None
-    second_order: Callable[[xr.Dataset, Model, np.ndarray, bool, Interface | None], SecondOrder | None] = no_stresses
 
 
 def build(recipe: Mapping[str, Any], folder: str | Path = ".", where: str = PLACE) -> xr.Dataset:
@@ -54,11 +22,9 @@ def build(recipe: Mapping[str, Any], folder: str | Path = ".", where: str = PLAC
 
     folder: base of relative paths in the recipe.  where: name of the recipe in messages.
     """
-    kind: Kind = lookup(FAMILY, name_of(recipe), where="shape.type")
-    return kind.build(parse(recipe, where), Path(folder), where)
+    return KINDS[name_of(recipe)].build(parse(recipe, where), Path(folder), where)
 
 
 def of_mesh(mesh: xr.Dataset) -> Kind:
     """Return the kind of body of a mesh dataset."""
-    kind: Kind = lookup(FAMILY, str(mesh.attrs.get("body_kind", "beam")), where="mesh")
-    return kind
+    return KINDS[str(mesh.attrs.get("body_kind", "beam"))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexclear.structure.fe.exchange import matrices
-from flexclear.structure.kinds.kind import Kind
+from flexclear.structure.kinds.interface import Kind
 
 KIND = Kind(
     build=matrices.build,

@@ -13,7 +13,7 @@ from flexclear.structure.fe.solid import mesh as meshes
 from flexclear.structure.fe.solid import prestress
 from flexclear.structure.fe.solid.model import assemble, solid_of, unknowns_of
 from flexclear.structure.fe.statics import Flexibility, border, support
-from flexclear.structure.kinds.kind import Kind
+from flexclear.structure.kinds.interface import Kind
 
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5

@@ -17,13 +17,13 @@ from flexclear.structure.kinds.kind import of_mesh
 from flexclear.structure.modes import basis, deficits, eigen, imported
 from flexclear.structure.modes.basis import ModeRequest
 from flexclear.structure.modes.condition import Condition, Given, check
+from flexclear.structure.modes.reference import CONDITIONS
 from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress, silent
 
 if TYPE_CHECKING:
     from flexclear.scene.parts import Modes
 
-REFERENCES = "flexclear.structure.modes.reference"
 CARRIED = ("title", "section", "inertia_section")
 
 
@@ -84,7 +84,9 @@ def _held(
 ) -> tuple[Given, Condition]:
     """Return the scene's data of a reference condition, and the condition; raise InputError as `solve` does."""
     given = Given(tuple(_frame(model, name) for name in names), tuple(held), of)
-    condition: Condition = lookup(REFERENCES, reference, where="modes.reference")(model, given)
+    condition: Condition = lookup(CONDITIONS, reference, kind="reference condition", where="modes.reference")(
+        model, given
+    )
     check(model, condition)
     return given, condition
 

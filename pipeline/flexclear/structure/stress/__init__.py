@@ -4,5 +4,8 @@ To add one: a module here with ``recover(mesh, modes, gauges) -> dict``, the var
 line below.
 """
 
-KIND = "stress recovery"
-NAMES = {"beam": "beam:recover", "solid": "solid:recover"}
+from __future__ import annotations
+
+from flexclear.structure.stress import beam, solid
+
+RECOVERIES = {"beam": beam.recover, "solid": solid.recover}

@@ -5,5 +5,8 @@ Each module has the kernels ``force(depth, rate, impact_rate, law) -> (elastic, 
 `contact.law.Numbers`.
 """
 
-KIND = "form of a normal law"
-NAMES = {"elastic": "elastic", "hysteretic": "hysteretic", "linear-damper": "linear_damper"}
+from __future__ import annotations
+
+from flexclear.dynamics.contact.form import elastic, hysteretic, linear_damper
+
+FORMS = {"elastic": elastic, "hysteretic": hysteretic, "linear-damper": linear_damper}

@@ -1,11 +1,15 @@
-"""Friction laws. To add one: a module here named like the law, with a `LAW` (see `law.Friction`), its parameters in
+"""Friction laws. To add one: a module here with a `LAW` (see `law.Friction`), a line in the table, its parameters in
 scene/clearance, and a case in tests/properties/test_dynamics_friction and test_dynamics_clearance.
 
 A joint without friction names none.
 """
 
-from flexclear.scene.clearance import FRICTIONS
-from flexclear.scene.registry import declared
+from __future__ import annotations
 
-KIND = "friction law"
-NAMES = declared(FRICTIONS, key="law", made="LAW")
+from flexclear.dynamics.contact.friction import ambrosio, lugre, modified_coulomb
+
+FRICTION_LAWS = {
+    "modified-coulomb": modified_coulomb.LAW,
+    "ambrosio": ambrosio.LAW,
+    "lugre": lugre.LAW,
+}

@@ -13,7 +13,8 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
 from flexclear.dynamics.compile.functions import function, place
 from flexclear.dynamics.compile.sources import DESCRIBED, WHOLE
-from flexclear.dynamics.effects import INTEGRATORS, scheme_of
+from flexclear.dynamics.effects import scheme_of
+from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.integrate.method import Method
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
@@ -22,6 +23,7 @@ from flexclear.dynamics.model.initial import given_rates
 from flexclear.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import start_errors
+from flexclear.dynamics.run import bushings, joint_friction
 from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
     address,
@@ -31,10 +33,11 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     made,
 )
 from flexclear.scene.loads import SampledPid
-from flexclear.scene.registry import lookup
 from flexclear.system.errors import InputError, SolverError, refuse
 from flexclear.system.progress import Progress, silent
 
+#: of effects: why a run stopped, in words
+EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: selections of closure rows with specialised steps, per integration
 SELECTIONS = 4
 #: without steps: no output times, no rows, no events
@@ -237,7 +240,7 @@ class Engine:
 
     def explained(self) -> str | None:
         """Reason for which an effect ends the run; None when none does."""
-        reasons = (explain(self) for explain in self.model.parts.functions("explains"))
+        reasons = (explain(self) for explain in self.model.parts.functions(EXPLANATIONS))
         return next((why for why in reasons if why is not None), None)
 
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
@@ -274,7 +277,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     refuse_singular(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
-    return assemble(model, entry, lookup(INTEGRATORS, solver.integrator, where="[solver.integrator]"), mobility)
+    return assemble(model, entry, METHODS[solver.integrator], mobility)
 
 
 def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mobility) -> Engine:

@@ -1,8 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
 It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
-steps run a list of calls of routines, except with many bearings that rub; all other evaluations are those of kernels
-then. The topology alone decides, so that equal scenes give equal bytes.
+steps run a list of calls of routines if these know all parts of the mechanism, else kernels; all other evaluations are
+those of kernels then. The topology alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -31,6 +31,14 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
+#: joints, surfaces, loads and effects that routines know (`mechanics`, which is imported only to compile)
+KNOWN = set(
+    "fixed revolute prismatic cylindrical slot planar universal spherical rotation-vector free "
+    "clearance-spherical clearance-revolute clearance-slot ball-on-plane "
+    "joint-force joint-spring joint-friction joint-expression pid sampled-pid spring-damper line-expression bushing "
+    "point-force point-torque point-expression "
+    "stiffening stops gears bushings controllers joint_friction wear".split()
+)
 #: bearings with friction whose loads one routine finds: its code grows with their number cubed (16: 3 s of LLVM)
 MOST_BEARINGS = 16
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
@@ -88,8 +96,11 @@ def address(
 
 
 def has_routines(model: Model) -> bool:
-    """Return True when routines serve a mechanism: all but those with many bearings that rub."""
-    return model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
+    """Return True when routines know all parts of a mechanism, and few enough bearings rub."""
+    parts = model.parts
+    loads, effects = (kind.partition(" ")[0] for kind in parts.loads), (one.name for one in parts.present)
+    known = KNOWN.issuperset([*parts.joints, *parts.surfaces, *loads, *effects])
+    return known and model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
 
 
 def call_list(

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
-import scipy.io
 import scipy.sparse as sp
 
 from flexclear.structure.fe.exchange import nodes, programs
@@ -85,6 +84,8 @@ def write_npz(model: Model, path: Path) -> None:
 
 def write_matrix_market(model: Model, folder: Path) -> None:
     """Write stiffness.mtx, mass.mtx and unknowns.csv to a folder, in SI units."""
+    import scipy.io  # here, since it takes as long as all other modules of bodies
+
     for name, matrix in (("stiffness", model.stiffness), ("mass", model.mass)):
         scipy.io.mmwrite(folder / f"{name}.mtx", sp.coo_array(matrix), symmetry="symmetric", precision=17)
     content = table(model)
@@ -234,6 +235,8 @@ def _matrix(path: Path, where: str) -> sp.coo_array:
 
     NumPy reads the numbers: `scipy.io.mmread` (1.17) ends the process where a file was cut or has a flipped bit.
     """
+    import scipy.io
+
     require_file(path, where)
     with reading(path, where, f"'{path.name}' is not a MatrixMarket file"):
         rows, columns, count, layout, field, symmetry = scipy.io.mminfo(path)

@@ -3,16 +3,19 @@
 To add one: a function ``(model, given) -> Condition`` in `held` or `floating`, and a line below.
 """
 
-KIND = "reference condition"
-NAMES = {
-    "free-free": "floating:free_free",
-    "fixed-fixed": "held:fixed_fixed",
-    "cantilever": "held:cantilever",
-    "pinned-pinned": "held:pinned_pinned",
-    "constrained": "held:constrained",
-    "mean-axis": "floating:mean_axis",
-    "craig-bampton": "held:craig_bampton",
-    "given": "held:given_shapes",
-    "craig-chang": "floating:craig_chang",
-    "residual-flexibility": "floating:residual_flexibility",
+from __future__ import annotations
+
+from flexclear.structure.modes.reference import floating, held
+
+CONDITIONS = {
+    "free-free": floating.free_free,
+    "fixed-fixed": held.fixed_fixed,
+    "cantilever": held.cantilever,
+    "pinned-pinned": held.pinned_pinned,
+    "constrained": held.constrained,
+    "mean-axis": floating.mean_axis,
+    "craig-bampton": held.craig_bampton,
+    "given": held.given_shapes,
+    "craig-chang": floating.craig_chang,
+    "residual-flexibility": floating.residual_flexibility,
 }

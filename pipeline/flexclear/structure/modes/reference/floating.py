@@ -18,8 +18,6 @@ from flexclear.structure.fe.model import Model, rows
 from flexclear.structure.modes.condition import Condition, Given, distinct, interfaces_of
 from flexclear.system.errors import InputError
 
-FAMILY = "flexclear.structure.modes.reference"
-
 
 def free_free(model: Model, given: Given) -> Condition:
     """Return the condition for normal modes of the free body; `given` is not used."""
@@ -55,7 +53,9 @@ def mean_axis(model: Model, given: Given) -> Condition:
     if given.of is None or given.of == "mean-axis":
         problem = "mean-axis changes the shapes of another condition; none is given"
         raise InputError("modes.of", problem, 'name it, as of = "craig-bampton"')
-    based: Condition = lookup(FAMILY, given.of, where="modes.of")(model, given)
+    from flexclear.structure.modes.reference import CONDITIONS  # here, since conditions are based on others
+
+    based: Condition = lookup(CONDITIONS, given.of, kind="reference condition", where="modes.of")(model, given)
     note = f"shapes of {given.of}; their linear and angular momentum was removed"
     return replace(based, mean_axes=True, note=note)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.joint_friction.bearings import BEARINGS, SLIDER
+from flexclear.dynamics.effects.joint_friction import BEARINGS, SLIDER
 from flexclear.dynamics.model.components import Floors, Group
 from flexclear.dynamics.model.contacts import bristle, friction_law
 from flexclear.dynamics.model.filling import Filling
@@ -36,8 +36,8 @@ def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Grou
 def guards(mechanism: Mechanism) -> Iterator[Guard]:
     """Yield the guards of each bearing: speeds, reversals of sliding for laws with bristles, reversals of loads."""
     bearing = 0
-    for name, joint in mechanism.scene.rubbing().items():
-        law = friction_law(name, joint)
+    for joint in mechanism.scene.rubbing().values():
+        law = friction_law(joint)
         assert joint.friction is not None
         for _ in BEARINGS[joint.type]:
             row = bearing * BENDS.size
@@ -98,7 +98,7 @@ def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
     axial = (friction.axial_radius or radius) / radius if joint.type == "revolute" else 0.0
     torsion = 1.0 / radius if kind == SLIDER and radius else 0.0
     lever = 1.0 / friction.length if friction.length else 0.0
-    return [radius, lever, axial, torsion, friction.preload, *friction_law(name, joint).parameters(friction)]
+    return [radius, lever, axial, torsion, friction.preload, *friction_law(joint).parameters(friction)]
 
 
 def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:

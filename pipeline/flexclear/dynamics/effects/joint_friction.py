@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from flexclear.dynamics.effects.effect import Effect
@@ -10,18 +9,26 @@ from flexclear.dynamics.effects.effect import Effect
 if TYPE_CHECKING:
     from flexclear.scene.schema import Scene
 
+#: kinds of bearings: a pin rotates, a slider slides, a sleeve does both, a ball rotates about every axis
+PIN, SLIDER, SLEEVE, BALL = range(4)
+#: by type of joint, for each bearing: kind, side (0: first frame, 1: second), axis of that frame along the bearing
+BEARINGS: dict[str, tuple[tuple[int, int, int], ...]] = {
+    "revolute": ((PIN, 0, 2),),
+    "prismatic": ((SLIDER, 0, 2),),
+    "cylindrical": ((SLEEVE, 0, 2),),
+    "universal": ((PIN, 0, 0), (PIN, 1, 1)),
+    "spherical": ((BALL, 0, 2),),
+}
 
-def _named(scene: Scene) -> Iterator[tuple[str, str, str]]:
-    for name, joint in scene.rubbing().items():
-        if joint.friction is not None:
-            yield "contact.friction", joint.friction.law, f"[joint.{name}.friction]"
+
+def _laws(scene: Scene) -> list[str]:
+    return sorted({joint.friction.law for joint in scene.rubbing().values() if joint.friction is not None})
 
 
 JOINT_FRICTION = Effect(
     "joint_friction",
-    lambda scene: sorted({law for _, law, _ in _named(scene)}) or None,
-    "contact.friction",
-    _named,
+    lambda scene: _laws(scene) or None,
+    "FRICTION_LAWS",
     topology={
         # site_a, site_b: of its frames; link: the link whose inboard joint it is, or -1; reversed: 1 when that link is
         # on the side of the first frame; closure: its closure, or -1
@@ -56,16 +63,11 @@ JOINT_FRICTION = Effect(
     ),
     compose={
         "evaluate": {
-            "friction": "(<equations.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
-            "<equations.load_drives>)"
+            "friction": "(<equations.joint_friction.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
+            "<equations.joint_friction.load_drives>)"
         },
-        "observe closures": {"friction": "<equations.take_off_closures>"},
+        "observe closures": {"friction": "<equations.joint_friction.take_off_closures>"},
     },
-    fill="model:fill",
-    ledger="model:ledger",
-    guards="model:guards",
-    losses="run:losses",
-    explains="run:explanation",
-    records={("joint_bearing", "joint_sliding", "joint_friction_"): "record:friction_series"},
-    warns="record:warnings",
+    ledger=True,
+    guards=True,
 )

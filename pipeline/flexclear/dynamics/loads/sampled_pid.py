@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.dynamics.effects.controllers.pid import settings
 from flexclear.dynamics.gauge import counted
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.loads.fields import act, measure
+from flexclear.dynamics.loads.pid import settings
 from flexclear.dynamics.loads.row import Row
 from flexclear.dynamics.vectors import scale
 from flexclear.scene.loads import SampledPid

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.wear.contact import LEDGER
+from flexclear.dynamics.contact.wear import LEDGER
 from flexclear.dynamics.equations.observation import Observed, Series
 from flexclear.dynamics.model.model import Model
 

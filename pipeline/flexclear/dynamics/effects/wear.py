@@ -11,9 +11,7 @@ WEAR = Effect(
     "wear",
     lambda scene: () if scene.worn() else None,
     topology={"worn": "contact"},  # contacts with wear
-    compose={"forces": {"contacts": "<contact.wearing>({file.given[contacts]})"}},
+    compose={"forces": {"contacts": "<contact.wear.wearing>({file.given[contacts]})"}},
     changeable=("joint.wear",),
-    fill="model:fill",
-    ledger="model:ledger",
-    records={("wear_",): "record:wear_series"},
+    ledger=True,
 )

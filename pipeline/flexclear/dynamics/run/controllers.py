@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import pieces_of, size
-from flexclear.dynamics.effects.controllers.sampled_pid import sample as sample_error
 from flexclear.dynamics.equations.observation import Observed
+from flexclear.dynamics.loads.sampled_pid import sample as sample_error
 from flexclear.dynamics.model.gauges import values
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.ledger import REMEDY
-from flexclear.dynamics.run.trajectory import Trajectory
 from flexclear.scene.loads import Pid, SampledPid
 from flexclear.system.errors import SolverError
 
+if TYPE_CHECKING:
+    from flexclear.dynamics.run.evaluation.engine import Engine
+    from flexclear.dynamics.run.trajectory import Trajectory
+
+#: remedy for an unbounded motion
+REMEDY = "reduce the gain or the period of a controller, or increase the time constant of a load"
 #: a break is a sample when it deviates by no more than this fraction of the period
 AT_A_SAMPLE = 1e-6
 #: a coordinate diverges at this multiple of the largest of its reference, its start, a turn or the mechanism

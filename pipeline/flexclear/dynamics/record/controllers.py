@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from flexclear.artifacts.coordinates import motion
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.controllers.sampled_pid import INTEGRAL
 from flexclear.dynamics.equations.observation import Observed, Series
+from flexclear.dynamics.loads.sampled_pid import INTEGRAL
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record.loads import along_coordinates, turning_loads
 from flexclear.scene.loads import Pid, SampledPid

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.dynamics.effects.stops.model import End
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.model.stops import End
 
 
 def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:

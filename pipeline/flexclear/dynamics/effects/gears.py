@@ -10,10 +10,7 @@ GEARS = Effect(
     topology={"couplings": "first second"},  # gauges of two joint coordinates; the second follows the first
     numbers={"coupling_numbers": "ratio offset"},  # second coordinate = ratio * first + offset
     compose={
-        "closures": {"closures": "<equations.make_coupled_closing>({file.tree})"},
-        "observe": {"couplings": "<equations.take_off_first_joints>"},
+        "closures": {"closures": "<equations.gears.make_coupled_closing>({file.tree})"},
+        "observe": {"couplings": "<equations.gears.take_off_first_joints>"},
     },
-    fill="model:fill",
-    records={("gear_",): "record:gear_series"},
-    acts="record:on_geared_frames",
 )

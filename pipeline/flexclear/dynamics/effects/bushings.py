@@ -7,7 +7,4 @@ from flexclear.dynamics.effects.effect import Effect
 BUSHINGS = Effect(
     "bushings",
     lambda scene: () if any(load.type == "bushing" for load in scene.load.values()) else None,
-    records={("bushing_",): "run:bushing_series"},
-    states="run:rotations",
-    explains="run:explanation",
 )

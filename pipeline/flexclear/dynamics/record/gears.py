@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.artifacts.coordinates import motion
-from flexclear.dynamics.effects.gears.model import Coupling, Side
 from flexclear.dynamics.equations.observation import Observed, Series
+from flexclear.dynamics.model.gears import Coupling, Side
 from flexclear.dynamics.model.model import Model
 
 

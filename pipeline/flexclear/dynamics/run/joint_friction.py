@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.ledger import Losses
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.run.evaluation.engine import Engine
+    from flexclear.dynamics.run.ledger import Losses
 
 #: reasons of a stop that do not depend on a jam in the last trial
 OTHERWISE = (m.CAP_REACHED, m.NOT_A_NUMBER, m.STUCK_EVENT, m.STEPPED_OVER)

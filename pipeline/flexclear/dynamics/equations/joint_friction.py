@@ -34,7 +34,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.choice import choose, nothing, repeat
-from flexclear.dynamics.effects.joint_friction.bearings import BALL, PIN, SLIDER
+from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
 from flexclear.dynamics.equations.closures import closure_wrench, respond
 from flexclear.dynamics.gauge import relative_twist
 from flexclear.dynamics.kernels import kernel

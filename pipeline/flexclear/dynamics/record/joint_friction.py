@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.equations.observation import Observed, Series
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.run.run import Run
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.run.run import Run
 
 
 def friction_series(model: Model, seen: Observed) -> Series:

@@ -10,7 +10,4 @@ CONTROLLERS = Effect(
     "controllers",
     lambda scene: () if any(load.type in TYPES for load in scene.load.values()) else None,
     changeable=tuple(f"load.{key}" for key in NUMBERS),
-    records={("controller_",): "record:controller_series"},
-    samples="run:sampler",
-    refuses="run:require_controlled",
 )

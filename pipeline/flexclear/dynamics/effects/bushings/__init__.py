@@ -1,1 +1,0 @@
-"""Bushings: rotation vectors beyond half a turn, and recorded displacements."""

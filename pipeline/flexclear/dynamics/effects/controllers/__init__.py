@@ -1,1 +1,0 @@
-"""Controllers of joint coordinates: samples, divergence checks, and recorded forces."""

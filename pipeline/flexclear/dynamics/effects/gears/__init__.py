@@ -1,1 +1,0 @@
-"""Gears and racks: constraints between two joint coordinates."""

@@ -1,1 +1,0 @@
-"""Stiffening of flexible bodies by forces and accelerations."""

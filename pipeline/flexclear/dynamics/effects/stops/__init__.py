@@ -1,1 +1,0 @@
-"""Stops: contacts at the ends of joint coordinates."""

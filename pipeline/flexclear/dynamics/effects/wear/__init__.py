@@ -1,1 +1,0 @@
-"""Wear of contacts: the sliding distance of their surfaces, and the normal force over it."""
