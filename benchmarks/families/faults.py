@@ -68,7 +68,7 @@ DAMAGED = (
     "artifacts",
     "records",
     "shown files",
-    "memo of imports",
+    "memo of code",
     "generated sources",
     "digests of kernels",
     "compiled code",
@@ -172,7 +172,7 @@ def _damaged(place: Place) -> dict[str, list[tuple[Path, Judge]]]:
         "artifacts": [(path.with_suffix(".nc"), _artifact(store, path)) for path in records],
         "records": [(path, _same(read_record, path)) for path in records],
         "shown files": [(path, partial(_shown, store)) for path in shown],
-        "memo of imports": [(path, _same(read_checked, path)) for path in [store.root / "cache" / "imports.json"]],
+        "memo of code": [(path, _same(read_checked, path)) for path in [store.root / "cache" / "code.json"]],
         "generated sources": [(path, _kernel(path)) for path in kernels],
         "digests of kernels": [(path.with_suffix(".sum"), _kernel(path)) for path in kernels],
         "compiled code": [(path.with_suffix(CODE), _kernel(path)) for path in kernels],
@@ -197,7 +197,7 @@ def _folders(place: Place) -> Counter[str]:
         path for suffix in ("nc", "json", "names") for path in sorted((store.root / "cache").glob(f"*/*.{suffix}"))
     ]
     shown = sorted((store.root / "runs").rglob("*.nc"))
-    for path in [*cached, *shown, store.root / "cache" / "imports.json"]:
+    for path in [*cached, *shown, store.root / "cache" / "code.json"]:
         path.unlink(missing_ok=True)
         path.mkdir()
         (path / "mine").write_text("stays", encoding="utf-8", newline="\n")

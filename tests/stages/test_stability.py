@@ -135,7 +135,7 @@ def test_outcomes_are_remembered_until_their_sources_change(tmp_path: Path, monk
     first.learn(bad, [{"case": bad.name, "verdict": REFUSED, "reason": "too stiff"}])
     first.forget([good, bad])  # outcomes stand, unlike times
     assert log.Memory("stability", FAMILY, folder=tmp_path).recall(good) == found
-    monkeypatch.setattr(log, "sources", lambda spec, case: "edited")
+    monkeypatch.setattr(log, "sources", lambda spec: "edited")
     assert log.Memory("stability", FAMILY, folder=tmp_path).recall(good) is None
     trusting = log.Memory("stability", FAMILY, trusting=True, folder=tmp_path)
     assert trusting.recall(good) == found

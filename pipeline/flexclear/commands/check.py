@@ -18,7 +18,8 @@ from flexclear.scene import lines
 from flexclear.scene.limits import Limits
 from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file
 from flexclear.scene.references import dangling
-from flexclear.scene.toml_files import read_toml, recipe_frames
+from flexclear.scene.segments import body_frames, cut
+from flexclear.scene.toml_files import read_toml
 from flexclear.scene.variants import ideal, loose
 from flexclear.stages import meshing, modal_analysis, scenes, show, simulation
 from flexclear.stages.graph import Graph
@@ -141,7 +142,7 @@ def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
 
 
 def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
-    findings.errors += dangling(compose(path), recipe_frames, str(path))
+    findings.attempt(lambda: refuse(dangling(cut(compose(path), str(path)), body_frames, str(path))))
     loaded: list[Scene] = []
     findings.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
     # bodies may share a recipe, which is meshed once
@@ -216,14 +217,14 @@ class Body:
 
 
 #: type of `meshed` as a function of a recipe's path
-MeshOf = Callable[[Path], tuple[Body | None, Findings]]
+MeshOf = Callable[..., tuple[Body | None, Findings]]
 
 
 def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
     """Check meshes and requested modes of a scene whose recipes can be read, then the mechanism that they form."""
     bodies: dict[str, Body] = {}
     for name, path in whole.recipes().items():
-        body, of_mesh = mesh_of(Path(path))
+        body, of_mesh = mesh_of(Path(path), segment=getattr(whole.body[name], "segment", None))
         findings.errors += of_mesh.errors
         findings.warnings += of_mesh.warnings
         bodies |= {name: body} if body is not None else {}
@@ -237,16 +238,21 @@ def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
         _free_motions(whole, rigid, findings)
 
 
-def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findings]:
-    """Return the body of a recipe if its mesh is allowed and takes seconds (else None), with errors and warnings."""
+def meshed(
+    path: Path, limits: Limits | None = None, segment: tuple[int, int] | None = None
+) -> tuple[Body | None, Findings]:
+    """Return the body of a recipe if its mesh is allowed and takes seconds (else None), with errors and warnings.
+
+    segment: of its rod; default: the whole.
+    """
     findings = Findings()
     made: list[Body] = []
     if findings.attempt(partial(meshing.check_size, path, limits or Limits())):
-        findings.attempt(lambda: made.extend(_meshed(path, findings)))
+        findings.attempt(lambda: made.extend(_meshed(path, segment, findings)))
     return (made[0] if made else None), findings
 
 
-def _meshed(path: Path, findings: Findings) -> Iterator[Body]:
+def _meshed(path: Path, segment: tuple[int, int] | None, findings: Findings) -> Iterator[Body]:
     from flexclear.structure.fe.recipe import parse
     from flexclear.structure.kinds import kind
     from flexclear.structure.modes import bundle
@@ -257,7 +263,7 @@ def _meshed(path: Path, findings: Findings) -> Iterator[Body]:
     if any(is_file(file) and file.stat().st_size > LARGEST_FILE for file in opened):
         return
     try:
-        mesh = kind.build(table, path.parent)
+        mesh = kind.build(table, path.parent, segment=segment)
     except InputError as error:
         raise meshing.in_recipe(error, path) from None
     findings.warnings += _unit(mesh, table, path)

@@ -16,6 +16,7 @@ from flexclear.scene.fields import LONGEST_NAME
 from flexclear.scene.limits import check_parts
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
+from flexclear.scene.segments import cut
 from flexclear.scene.solver import close_choice
 from flexclear.scene.toml_files import read_toml
 from flexclear.scene.units import any_quantity
@@ -94,7 +95,10 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
 
     Raises InputError for a part or key that does not exist; a setting may be absent already.
     """
-    table = scene.model_dump(mode="json", exclude_none=True)
+    parts = [where.split(".")[1] for where in override if where.startswith("body.")]
+    # a rod in segments is edited as one body, unless one of its segments is named
+    whole = scene._whole if all(name in (scene._whole or {}).get("body", {}) for name in parts) else None
+    table = copy.deepcopy(whole or scene.model_dump(mode="json", exclude_none=True))
     for where, value in override.items():
         if value is not None:
             _put(table, where, value, f"edit of {scene.name}")
@@ -112,7 +116,9 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
 def _read(table: dict[str, Any], where: Path) -> Scene:
     """Return the scene in a table; validation errors, and requests beyond `[limits]`, are reported with this path."""
     try:
-        return Scene.model_validate(table)
+        scene = Scene.model_validate(pieces := cut(table, str(where)))
+        scene._whole = None if pieces.get("body") == table.get("body") else table
+        return scene
     except ValidationError as error:
         raise input_errors(where, error, Scene) from None
     except ResourceError as error:
@@ -132,6 +138,8 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
         if value is None or not key or names_file or (family not in FAMILIES and family not in SETTINGS):
             return edited(scene, override)
         changed.setdefault((family, name), {})[key] = value
+    if scene._whole is not None:
+        return edited(scene, override)
     result = scene
     for (family, name), values in changed.items():
         part = getattr(result, family).get(name) if name else getattr(result, family)

@@ -9,7 +9,7 @@ from flexclear.scene.drives import PathDrive
 from flexclear.scene.loads import Bushing, Pid, SampledPid
 from flexclear.scene.parts import Ground
 from flexclear.scene.quantity import KINDS
-from flexclear.scene.toml_files import recipe_frames
+from flexclear.scene.segments import body_frames
 
 #: joint type -> its coordinates by name, and whether each is an angle, as in the classes of the joints
 COORDINATES: Mapping[str, Mapping[str, bool]] = {
@@ -83,7 +83,8 @@ class _Frames(dict[str, bool]):
 def _frames(scene: Any) -> Iterator[str]:
     """Yield frames of bodies; of bodies whose recipe cannot be read, the frames that the scene names."""
     for name, body in scene.body.items():
-        known = recipe_frames(body.mesh) if getattr(body, "mesh", "") else getattr(body, "frames", None)
+        mesh, own = getattr(body, "mesh", ""), getattr(body, "frames", None)
+        known = body_frames(mesh, body.segment) if mesh else own
         yield from (f"{name}.{frame}" for frame in known or ())
     for part in (*scene.joint.values(), *scene.load.values(), *scene.drive.values()):
         yield from getattr(part, "between", ())

@@ -5,7 +5,7 @@ import math
 import re
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from flexclear.scene.clearance import Clearance, JointFriction, NormalLaw, require_fitting
 from flexclear.scene.fields import (
@@ -27,6 +27,7 @@ from flexclear.scene.fields import (
     require_one,
 )
 from flexclear.scene.laws import Value
+from flexclear.scene.segments import FEWEST, MOST
 from flexclear.scene.units import quantity
 
 #: keys of a body that affect pictures only
@@ -205,6 +206,15 @@ class Stiffening(Part):
     """Forces and accelerations stiffen the body, or soften it in compression: bending and twist shorten it."""
 
 
+def _of_several(value: tuple[int, int]) -> tuple[int, int]:
+    if not 1 <= value[0] <= value[1]:
+        raise ValueError(f"a segment is [k, n], the k-th of n, not {list(value)}")
+    return value
+
+
+OneOfSeveral = Annotated[tuple[int, int], AfterValidator(_of_several)]
+
+
 class FlexibleBody(Moving):
     """A body reduced from a mesh; its frames are those of the recipe, its body frame is that of the undeformed mesh."""
 
@@ -217,6 +227,17 @@ class FlexibleBody(Moving):
     """one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh damping; default: none"""
     stiffening: Stiffening | None = None
     """``{}`` for a body that forces and accelerations stiffen or soften, as a blade or column; default: they do not"""
+    segments: Annotated[int, Field(ge=FEWEST, le=MOST)] | None = None
+    """number of segments into which a rod that bends far is cut, each with these modes; ``modes`` then names no
+    interfaces. The segments of ``rod`` are the bodies ``rod_1``, ``rod_2`` ...; default: the rod is one body"""
+    segment: OneOfSeveral | None = None
+    """the rod's segment that this body is, [k, n] for the k-th of n, as `segments` writes it; default: the whole"""
+
+    @model_validator(mode="after")
+    def _ends_are_interfaces(self) -> Self:
+        if (self.segments or self.segment) and (self.modes.interfaces or self.modes.held):
+            raise ValueError("the ends of segments are their interfaces: leave out modes.interfaces and modes.held")
+        return self
 
 
 class MeshedRigidBody(Moving):
@@ -228,13 +249,15 @@ class MeshedRigidBody(Moving):
     type: Literal["rigid"]
     mesh: str
     """file of the mesh recipe, relative to the scene; the body frame is that of the mesh"""
+    segment: OneOfSeveral | None = None
+    """the rod's segment that this body is, as of a flexible body; default: the whole"""
 
     @model_validator(mode="before")
     @classmethod
     def _without_modes(cls, table: Any) -> Any:
         if not isinstance(table, dict) or table.get("type") != "flexible":
             return table
-        rest = {key: value for key, value in table.items() if key not in ("modes", "damping", "stiffening")}
+        rest = {key: value for key, value in table.items() if key not in ("modes", "damping", "stiffening", "segments")}
         if isinstance(rest.get("source"), dict):
             rest["source"] = {key: text for key, text in rest["source"].items() if key in rest}
         return {**rest, "type": "rigid"}

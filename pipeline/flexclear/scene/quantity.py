@@ -259,7 +259,17 @@ def _term(name: str, owners: Mapping[str, Collection[str]]) -> Quantity:
             raise ValueError(f"'{whole}' has no component '{component}'; vectors have x, y and z")
         turns = isinstance(known, Mapping) and bool(known[part])
         return Quantity(owner, key, component if whole != name else "", turns, "" if owner else word)
+    on_segment = _on_segment(owner, owners.get("frame", ()))
+    if on_segment != owner:
+        return _term(on_segment + name.removeprefix(owner), owners)
     raise ValueError(f"there is no quantity '{name}' in this scene ({_nearest(owner, word, owners)})")
+
+
+def _on_segment(frame: str, known: Collection[str]) -> str:
+    """Return ``rod_3.tip`` for the frame ``rod.tip`` of a rod in segments; other names as they are."""
+    body, _, own = frame.partition(".")
+    pattern = re.compile(rf"{re.escape(body)}_\d+\.{re.escape(own)}") if own else None
+    return next((name for name in known if pattern is not None and pattern.fullmatch(name)), frame)
 
 
 def _nearest(owner: str, word: str, owners: Mapping[str, Collection[str]]) -> str:

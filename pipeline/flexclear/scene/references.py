@@ -5,7 +5,7 @@ The plain table is examined, so that a scene with other errors is checked, too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ from flexclear.scene.load import is_file
 from flexclear.scene.registry import suggestion
 from flexclear.system.errors import InputError
 
-#: returns the names of the frames in the mesh recipe of this path; None where they cannot be determined
-Recipe = Callable[[str], Collection[str] | None]
+#: returns the names of the frames in the mesh recipe of this path, or of a segment of its rod; None where they cannot
+#: be determined
+Recipe = Callable[[str, Sequence[int] | None], Collection[str] | None]
 #: keys of parts that name frames; keys that name joints, alone or in front of a coordinate
 FRAMES = (("joint", "between"), ("load", "between"), ("drive", "frame"), ("load", "frame"))
 JOINTS = (*product(("drive", "load", "stop"), ("joint", "actuators")), ("gear", "first"), ("gear", "second"))
@@ -52,7 +53,7 @@ def _tables(family: object) -> Iterator[tuple[str, dict[str, Any]]]:
 def _frames(body: Mapping[str, Any], recipe: Recipe) -> Collection[str] | None:
     """Return the names of a body's frames; None where another error, reported elsewhere, hides them."""
     if isinstance(body.get("mesh"), str):
-        return recipe(body["mesh"])
+        return recipe(body["mesh"], body.get("segment"))
     frames = body.get("frames", {})
     return list(frames) if isinstance(frames, dict) else None
 

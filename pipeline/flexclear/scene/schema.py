@@ -341,6 +341,8 @@ class Scene(Part):
 
     _name: str = PrivateAttr(default="scene")
     _path: Path | None = PrivateAttr(default=None)
+    #: the table that the scene was read from, with rods that are cut into segments as one body
+    _whole: dict[str, Any] | None = PrivateAttr(default=None)
 
     @property
     def name(self) -> str:
@@ -386,6 +388,14 @@ class Scene(Part):
     def flexible(self) -> dict[str, FlexibleBody]:
         """Return the flexible bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
+
+    def rods(self) -> dict[str, list[str]]:
+        """Return the flexible bodies by name, of a rod in segments by the rod's: itself, or the segments."""
+        result: dict[str, list[str]] = {}
+        for name, body in self.flexible().items():
+            whole = name if body.segment is None else name.removesuffix(f"_{body.segment[0]}")
+            result.setdefault(whole, []).append(name)
+        return result
 
     def meshed(self) -> dict[str, MeshedRigidBody]:
         """Return the rigid bodies with mass, inertia and frames of a mesh recipe, by name."""

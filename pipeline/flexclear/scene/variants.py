@@ -39,7 +39,7 @@ EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
 KINDS = {"bushing": "bushing", "spring-damper": "spring", "joint-spring": "spring"}
 KINDS |= {"pid": "controller", "sampled-pid": "controller"}
 #: keys of a flexible body that a rigid one from the same recipe also has
-SHARED_KEYS = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
+SHARED_KEYS = ("mesh", "segment", "pose", "velocity", "angular_velocity", *UNSEEN)
 #: settings that follow the parts: quantities of removed parts are no longer requested or shown
 FOLLOWING = ("accuracy", "view", "ensemble")
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -70,7 +70,8 @@ class Effect:
 def effects(scene: Scene) -> tuple[Effect, ...]:
     """Return the removable effects of a scene, flexible bodies first, each followed by those that depend on it."""
     listed = list[Effect]()
-    for name, body in scene.flexible().items():
+    rods = scene.rods()
+    for name, body in ((name, scene.flexible()[pieces[0]]) for name, pieces in rods.items()):
         whole = Effect(f"body.{name}.modes", FLEXIBILITY)
         listed.append(whole)
         for key in ("damping", "stiffening"):
@@ -230,6 +231,10 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
         if effect.within in places:
             continue
         family, name = effect.name.split(".")[:2]
+        if family == "body" and name not in scene.body:
+            for piece in scene.rods()[name]:
+                changes |= _changes(scene, [replace(effect, name=effect.name.replace(name, piece, 1))])
+            continue
         part = getattr(scene, family)[name]
         if effect.joint:
             joint = name if name not in scene.joint else f"{name}_ideal"

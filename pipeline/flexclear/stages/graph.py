@@ -68,7 +68,7 @@ class Graph:
             body: self._task(
                 "mesh",
                 "meshing:run",
-                meshing.params(recipe, self.recipe),
+                meshing.params(recipe, self.recipe, getattr(self.scene.body[body], "segment", None)),
                 part=body,
                 context={"folder": str(recipe.parent.resolve()), "file": self.scene.recipes()[body]},
                 files=meshing.files(read_toml(recipe), recipe.parent),

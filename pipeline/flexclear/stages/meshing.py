@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,11 +26,13 @@ PLACE = "mesh recipe"
 FILES = ("file", "stiffness", "mass", "unknowns", "nodes", "basis", "listing")
 
 
-def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def params(
+    recipe: Path, edits: Mapping[str, Any] | None = None, segment: Sequence[int] | None = None
+) -> dict[str, Any]:
     """Return the recipe's content, without its name, its folder, and its sources (see `sources`).
 
     Raises InputError when the recipe cannot be read, or a source is not text. edits: values that replace the recipe's;
-    for `elements` a factor, without effect on recipes that have none.
+    for `elements` a factor, without effect on recipes that have none. segment: of the rod, if not all of it.
     """
     table = read_toml(recipe)
     require_kind(table, recipe, RECIPE)
@@ -42,7 +44,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     sources(recipe)
-    return {"recipe": provenance.without(table | changes)}
+    return {"recipe": provenance.without(table | changes)} | ({"segment": list(segment)} if segment else {})
 
 
 def sources(recipe: Path, where: str = "") -> dict[str, str]:
@@ -94,13 +96,13 @@ def in_recipe(error: InputError, path: Path) -> InputError:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Build the mesh (schema MESH or SOLID) as ``nc``, and for other programs as ``vtu``.
 
-    params: the recipe; its file; its folder, to which the paths of the files in it are relative.
+    params: the recipe; a segment of its rod; its file; its folder, to which the paths of the files in it are relative.
     """
     from flexclear.structure.kinds import kind
 
     folder = Path(params.get("folder", "."))
     try:
-        result = kind.build(params["recipe"], folder)
+        result = kind.build(params["recipe"], folder, segment=params.get("segment"))
     except InputError as error:
         raise in_recipe(error, Path(params.get("file", PLACE))) from None
     return {"nc": result, "vtu": kind.of_mesh(result).vtu(result)}

@@ -28,7 +28,8 @@ from flexclear.scene.quantity import KINDS, parse
 from flexclear.scene.references import dangling
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
-from flexclear.scene.toml_files import read_toml, recipe_frames
+from flexclear.scene.segments import body_frames
+from flexclear.scene.toml_files import read_toml
 from flexclear.scene.units import quantity
 from flexclear.stages import export, simulation
 from flexclear.stages.derived_series import origins
@@ -333,7 +334,7 @@ def require_names(scene: Scene) -> None:
     """Raise InputErrors for dangling names in a scene, before any mesh or mode is computed for it."""
     table = scene.model_dump(mode="python", exclude_none=True)
     where = str(scene.path or scene.name)
-    refuse([*dangling(table, recipe_frames, where), *unrecorded(scene)])
+    refuse([*dangling(table, body_frames, where), *unrecorded(scene)])
 
 
 def unrecorded(scene: Scene) -> Iterator[InputError]:

@@ -70,7 +70,7 @@ def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
     from flexclear.post.render.mechanism import Looks
     from flexclear.post.render.start_view import Missing, start_view
 
-    bodies = {name: _body(Path(recipe)) for name, recipe in scene.recipes().items()}
+    bodies = {name: _body(scene.body[name], Path(recipe)) for name, recipe in scene.recipes().items()}
     looks = rendering.params(scene, "motion", "pvd")
     filled = _filled(scene, bodies, lone := _unplaced(scene))
     pose = start_pose(filled, placed(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
@@ -108,13 +108,13 @@ def _page(scene: Scene, view: StartView) -> bytes:
     return viewer_page(f"{title}: start", [viewer(page_view(view), title)])
 
 
-def _body(recipe: Path) -> xr.Dataset:
-    """Return rigid-body data and drawn surface of a mesh."""
+def _body(body: Any, recipe: Path) -> xr.Dataset:
+    """Return rigid-body data and drawn surface of a body with a mesh."""
     from flexclear.structure.kinds import kind
     from flexclear.structure.modes import bundle
 
     table: dict[str, Any] = meshing.params(recipe)["recipe"]
-    return bundle.drawn(kind.build(table, recipe.parent))
+    return bundle.drawn(kind.build(table, recipe.parent, segment=body.segment))
 
 
 def _unplaced(scene: Scene) -> list[str]:

@@ -182,5 +182,5 @@ def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[st
             "frames": frames,
             "frame_tolerance": FRAME_ERROR * float(np.ptp(data["frame_position"].values, axis=0).max()),
         }
-        result[body] = {key: value for key, value in bodies[body].items() if key != "mesh"} | numbers
+        result[body] = {key: value for key, value in bodies[body].items() if key not in ("mesh", "segment")} | numbers
     return result

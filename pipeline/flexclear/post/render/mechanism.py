@@ -195,11 +195,17 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
         elif "inertia" in body:
             com, inertia = at.centre(name), np.array(body["inertia"])
             key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
+            key = (rod_of(name, body),) if "segment" in body else key
             color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
             solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
             drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
             if len(drawn.points):
                 yield Part(owner, surfaces.moved(drawn, -com), color)
+
+
+def rod_of(name: str, body: Mapping[str, Any]) -> str:
+    """Return the name of the rod of which a body is a segment; its own name for a whole body."""
+    return name.removesuffix(f"_{body['segment'][0]}") if "segment" in body else name
 
 
 def _with_wheels(
@@ -276,7 +282,9 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, s
     columns = np.flatnonzero(run.mode_body.values == name)
     q = run.modal_coordinate.values[:, columns]
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
-    scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
+    fitting = max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
+    in_segments = "segment" in parameters(run)["body"][name]  # these fit together only as they are
+    scale = 1.0 if in_segments else looks.exaggeration or fitting
     color = looks.bodies.get(name, {}).get("color")
     shown = stressed and name in body_shape.stress_recorded(run)
     if stressed:  # grey does not look like a stress

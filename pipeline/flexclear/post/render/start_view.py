@@ -85,9 +85,10 @@ def start_view(
         drawn = replace(drawn, view=flat(normal, text, drawn.looks.up))
     # translucent, so that red lines inside are visible
     opacity = 0.4 if gaps else 1.0
+    rods = [mechanism.rod_of(name, text["body"][name]) for name in run["body"].values.tolist()]
     solid = [
         *(replace(part, opacity=min(part.opacity, opacity)) for part in drawn.parts),
-        *(_still(body, opacity) for body in drawn.flexible),
+        *(_still(body, list(dict.fromkeys(rods)).index(rods[body.index]), opacity) for body in drawn.flexible),
     ]
     drawn = replace(drawn, parts=tuple(solid), flexible=())
     extra = [layout.Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
@@ -97,10 +98,10 @@ def start_view(
     return StartView(drawn, tuple(marked), tuple(_notes(drawn, text, gaps)), tuple(gaps), gravity(text))
 
 
-def _still(body: mechanism.Flexible, opacity: float) -> layout.Part:
-    """Return a meshed body without deformation."""
+def _still(body: mechanism.Flexible, number: int, opacity: float) -> layout.Part:
+    """Return a meshed body without deformation; segments of a rod have the same number, which gives the colour."""
     shown = mechanism.skin(body.bundle, mechanism.rest(body.bundle), sharp=has_edges(body.bundle))
-    return layout.Part(body.index, shown, body.color or mechanism.COLORS[body.index % len(mechanism.COLORS)], opacity)
+    return layout.Part(body.index, shown, body.color or mechanism.COLORS[number % len(mechanism.COLORS)], opacity)
 
 
 def page_view(start: StartView) -> dict[str, Any]:
@@ -176,15 +177,20 @@ def _marks(
     used, positions = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
     for gap in gaps:
         yield Mark(gap.joint, f"does not fit: {gap.words}", 0.5 * (gap.start + gap.end), GAP)
-    for name, body in text.get("body", {}).items():
-        if body["type"] != "ground":
+    bodies = text.get("body", {})
+    for name, body in bodies.items():
+        segment, count = body.get("segment", (1, 1))
+        if body["type"] != "ground" and segment == (count + 1) // 2:  # a rod in segments has one name, at its middle
             index = list(run["body"].values).index(name)
-            yield Mark(name, _of_body(body), _middle(run, drawn, index), BODY)
+            detail = _of_body(body) if count == 1 else f"flexible, {count} segments"
+            yield Mark(mechanism.rod_of(name, body), detail, _middle(run, drawn, index), BODY)
     for name, joint in text.get("joint", {}).items():
         used |= set(joint["between"])
+        if all("segment" in bodies[frame.partition(".")[0]] for frame in joint["between"]) and "_cut_" in name:
+            continue
         clear = joint.get("clearance")
         clearance = f" {in_unit(clear, 'm')}" if clear else ""
-        detail = f"{joint['type']}{clearance}: {' – '.join(joint['between'])}"
+        detail = f"{joint['type']}{clearance}: {' – '.join(_frame(frame, bodies) for frame in joint['between'])}"
         yield Mark(name, detail, joints[name][0], CLEARANCE if clear else JOINT)
     for name, drive in text.get("drive", {}).items():
         if "joint" in drive:
@@ -197,7 +203,8 @@ def _marks(
         at = load.get("between", [load["frame"]] if "frame" in load else [])
         used |= set(at)
         if at:
-            yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([positions[f] for f in at], axis=0), LOAD)
+            detail = f"{load['type']}: {' – '.join(_frame(frame, bodies) for frame in at)}"
+            yield Mark(name, detail, np.mean([positions[f] for f in at], axis=0), LOAD)
         elif "joint" in load:
             yield Mark(name, f"{load['type']}: {_coordinate(load)}", joints[load["joint"]][0], LOAD)
     for name, stop in text.get("stop", {}).items():
@@ -207,9 +214,15 @@ def _marks(
         pair = [gear["first"], gear["second"]]
         where = np.mean([joints[one.partition(".")[0]][0] for one in pair], axis=0)
         yield Mark(name, f"gear {gear['ratio']}: {' – '.join(pair)}", where, JOINT)
-    for name, where in positions.items():
-        if name not in used:
-            yield Mark(name, "frame", where, FRAME)
+    rest = {_frame(name, bodies): where for name, where in positions.items() if name not in used}
+    for name, where in rest.items():
+        yield Mark(name, "frame", where, FRAME)
+
+
+def _frame(name: str, bodies: Mapping[str, Any]) -> str:
+    """Return the name of a frame, ``rod.tip`` where it is on a segment of ``rod``."""
+    body, _, frame = name.partition(".")
+    return f"{mechanism.rod_of(body, bodies.get(body, {}))}.{frame}"
 
 
 def _coordinate(part: Mapping[str, Any]) -> str:

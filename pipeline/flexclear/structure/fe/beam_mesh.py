@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import xarray as xr
 
 from flexclear.artifacts.schema import MESH, conform
 from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.scene.segments import SAME_PLACE, cut_names, cuts
 from flexclear.structure.fe import section_recipe
-from flexclear.structure.fe.beam_recipe import SAME_PLACE, BeamRecipe, Segment, segments
+from flexclear.structure.fe.beam_recipe import FRAME_ROTATION, BeamRecipe, Segment, segments
 from flexclear.structure.fe.section import POINTS
 from flexclear.structure.fe.vtu import vtu
 from flexclear.system.errors import InputError
@@ -41,6 +43,45 @@ def build(recipe: BeamRecipe, folder: Path, where: str) -> xr.Dataset:
     }
     data |= _constants(recipe, parts) | _lumps(recipe, x, R_MR, where)
     return conform(xr.Dataset(data, coords={"frame": names}), MESH, **_attributes(recipe, parts))
+
+
+def cut(mesh: xr.Dataset, segment: Sequence[int]) -> xr.Dataset:
+    """Return one segment of a rod's mesh, ``(k, n)`` being the k-th of n, with frames at its cut ends.
+
+    A mass at a cut belongs to the segment that ends there. Interfaces of the whole rod at a cut are left out, since the
+    cut end is one.
+    """
+    k, count = segment
+    first, last = cuts(mesh["abscissa"].values.tolist(), count)[k - 1 : k + 1]
+    ends = {name: {f"cut_{k - 1}": first, f"cut_{k}": last}[name] for name in cut_names(segment)}
+    nodes = dict(zip(mesh["frame"].values.tolist(), mesh["frame_node"].values.tolist(), strict=True))
+    inside = [name for name in mesh.attrs["interfaces"].split() if first <= nodes[name] <= last]
+    near, far = ([name for name, node in ends.items() if node == end] for end in (first, last))
+    interfaces = " ".join([*near, *(name for name in inside if nodes[name] not in ends.values()), *far])
+    part = mesh.isel(node=slice(first, last + 1), cell=slice(first, last))
+    part = part.isel(frame=_between(mesh["frame_node"].values, first, last))
+    if "lump_node" in mesh:
+        carried = _between(mesh["lump_node"].values, first if k == 1 else first + 1, last)
+        part = part.isel(lump=carried) if carried.size else part.drop_dims("lump")
+    part = xr.concat([part, _cut_ends(mesh, ends)], "frame", data_vars="minimal", coords="minimal")
+    part = part.assign({name: part[name] - first for name in ("cell_node", "frame_node", "lump_node") if name in part})
+    return conform(part, MESH, **{**mesh.attrs, "interfaces": interfaces})
+
+
+def _between(nodes: np.ndarray, first: int, last: int) -> np.ndarray:
+    """Return the indices of the entries whose nodes lie from `first` to `last`."""
+    return np.flatnonzero((nodes >= first) & (nodes <= last))
+
+
+def _cut_ends(mesh: xr.Dataset, ends: Mapping[str, int]) -> xr.Dataset:
+    """Return frames at nodes of a rod, their z along it."""
+    nodes, axes = np.array(list(ends.values()), dtype=np.int64), mesh["rod_rotation"].values @ FRAME_ROTATION
+    data: dict[str, Any] = {
+        "frame_node": (("frame",), nodes),
+        "frame_position": (("frame", "axis"), mesh["node_position"].values[nodes]),
+        "frame_rotation": (("frame", "axis", "axis2"), np.array([axes] * len(ends))),
+    }
+    return xr.Dataset(data, {"frame": list(ends)})
 
 
 def _nodes(parts: tuple[Segment, ...]) -> np.ndarray:

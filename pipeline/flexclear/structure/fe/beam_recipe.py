@@ -9,12 +9,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from flexclear.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, Positive
+from flexclear.scene.segments import SAME_PLACE
 from flexclear.structure.fe.recipe_parts import BodyRecipe, Isotropic, TurnedFrame
 from flexclear.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
-#: positions along a rod that differ by less than this fraction of its length are equal; they come from decimal text
-SAME_PLACE = 1e-9
 
 
 class StraightBeam(Part):

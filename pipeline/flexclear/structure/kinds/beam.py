@@ -109,6 +109,7 @@ KIND = Kind(
     vtu=beam_mesh.as_vtu,
     assemble=assemble,
     words=lambda model, families, vectors: [name.partition("_")[0] for name in families],
+    cut=beam_mesh.cut,
     exact=closed_form.columns,
     second_order=_second_order,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ class Kind:
     vtu: a VTU file of the mesh dataset, for ParaView.
     assemble: the model of the mesh dataset.
     words: one word for the motion of each mode, from its family and vectors of shape (ndof, n).
+    cut: one segment of a mesh dataset; None for kinds without any.
     exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
         families and the interfaces' names; None for kinds without any.
     second_order: second-order motion of vectors (ndof, n) that follows from stresses: without stiffening by forces and
@@ -38,5 +39,6 @@ class Kind:
     vtu: Callable[[xr.Dataset], bytes]
     assemble: Callable[[xr.Dataset], Model]
     words: Callable[[Model, list[str], np.ndarray], list[str]]
+    cut: Callable[[xr.Dataset, Sequence[int]], xr.Dataset] | None = None
     exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] | None = None
     second_order: Callable[[xr.Dataset, Model, np.ndarray, bool, Interface | None], SecondOrder | None] = no_stresses

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +11,31 @@ import xarray as xr
 from flexclear.structure.fe.recipe import parse
 from flexclear.structure.kinds import beam, matrices, name_of, solid
 from flexclear.structure.kinds.interface import Kind
+from flexclear.system.errors import InputError
 
 KINDS = {"beam": beam.KIND, "solid": solid.KIND, "matrices": matrices.KIND}
 #: name of a recipe in messages, where the caller has no better one
 PLACE = "mesh recipe"
 
 
-def build(recipe: Mapping[str, Any], folder: str | Path = ".", where: str = PLACE) -> xr.Dataset:
+def build(
+    recipe: Mapping[str, Any],
+    folder: str | Path = ".",
+    where: str = PLACE,
+    segment: Sequence[int] | None = None,
+) -> xr.Dataset:
     """Build the mesh dataset of a recipe's table; raise InputError for a wrong recipe or frames off the body.
 
-    folder: base of relative paths in the recipe.  where: name of the recipe in messages.
+    folder: base of relative paths in the recipe.  where: name of the recipe in messages.  segment: of its rod, (k, n)
+    for the k-th of n; default: the whole.
     """
-    return KINDS[name_of(recipe)].build(parse(recipe, where), Path(folder), where)
+    kind = KINDS[name_of(recipe)]
+    mesh = kind.build(parse(recipe, where), Path(folder), where)
+    if segment is None:
+        return mesh
+    if kind.cut is None:
+        raise InputError(where, "is no rod, so that it has no segments", "remove segment")
+    return kind.cut(mesh, segment)
 
 
 def of_mesh(mesh: xr.Dataset) -> Kind:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class Flexible:
 
     axis: unit vector along its longest extent, `length` [m], in the body frame.
     first: lowest frequency [rad/s] of its modes; 0 for a body whose rotation is not limited.
+    segments: number of segments of the rod of which this is one; 1 for a whole rod, 0 for other bodies.
     sections_turn: the bundle has the second-order motion of rotation, as all but bodies of some matrices have.
     """
 
@@ -46,6 +48,13 @@ class Flexible:
     length: float
     first: float
     sections_turn: bool
+    segments: int
+
+    def remedy(self, excess: float) -> str:
+        """Return the advice for a body that bends by a multiple of what linear modes hold for: of a rod, segments."""
+        if not self.segments:
+            return "divide it into several bodies joined by fixed joints, or make it stiffer"
+        return f"cut the rod into segments = {ceil(excess * self.segments)}, or make it stiffer"
 
 
 def flexibles(model: Model) -> list[Flexible]:
@@ -71,6 +80,9 @@ def flexibles(model: Model) -> list[Flexible]:
                 float(along.max() - along.min()),
                 float(np.sqrt(max(least, 0.0))),
                 bool(bundle["second_order_moment"].values.any()),
+                0
+                if bundle.attrs.get("section") in ("solid", "matrices")
+                else (model.scene.flexible()[name].segment or (1, 1))[1],
             )
         )
     return bodies
@@ -78,7 +90,7 @@ def flexibles(model: Model) -> list[Flexible]:
 
 def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
     """Return warnings about flexible bodies that left the range of linear modes in the observed rows of a run."""
-    return [text for body in flexibles(model) for text in _judged(body, time, seen.positions, seen.links)]
+    return _worst(model, time, seen.positions, seen.links)
 
 
 def doubts(engine: Engine) -> list[str]:
@@ -90,28 +102,46 @@ def doubts(engine: Engine) -> list[str]:
         if not (np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.at)))):
             return []
         time = engine.control[m.TIME : m.TIME + 1]
-        return [text for body in flexibles(engine.model) for text in _judged(body, time, coordinates, frames)]
+        return _worst(engine.model, time, coordinates, frames)
 
 
-def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray) -> Iterator[str]:
-    """Return warnings about one body; shapes (rows, coordinate) and (rows, link), the latter fields of LINK_FRAMES."""
-    yield from _spun(body, time, frames[:, body.link])
+def _worst(model: Model, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray) -> list[str]:
+    """Return the warnings about all bodies; of the segments of a rod the worst of each kind.
+
+    Shapes (rows, coordinate) and (rows, link), the latter fields of LINK_FRAMES.
+    """
+    found: dict[tuple[str, str], tuple[float, str]] = {}
+    rod_of = {piece: rod for rod, pieces in model.scene.rods().items() for piece in pieces}
+    for body in flexibles(model):
+        for kind, excess, text in _judged(body, time, coordinates, frames):
+            key = rod_of[body.name], kind
+            found[key] = max(found.get(key, (0.0, "")), (excess, text))
+    return [text for _, text in found.values()]
+
+
+def _judged(
+    body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray
+) -> Iterator[tuple[str, float, str]]:
+    """Yield kind, excess over the limit and text of each warning about one body."""
+    yield from (("speed", 1.0, text) for text in _spun(body, time, frames[:, body.link]))
     q = coordinates[:, body.coordinates]
     if body.length > 0.0:
         row, bent = largest(body.shapes, q, BENT * body.length)
         if bent > BENT * body.length:
-            yield (
+            excess = bent / body.length / BENT
+            text = (
                 f"{body.name}: at t = {time[row]:.6g} s a point is {bent:.3g} m from its undeformed position, "
-                f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: divide it into several "
-                "bodies joined by fixed joints, or make it stiffer"
+                f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: " + body.remedy(excess)
             )
+            yield "displacement", excess, text
     row, turned = largest(body.rotations, q, SECTION_ROTATION)
     if turned > SECTION_ROTATION:
-        yield (
+        excess = turned / SECTION_ROTATION
+        text = (
             f"{body.name}: at t = {time[row]:.6g} s a section is rotated by {turned:.3g} rad by its deformation; "
-            f"linear modes hold below {SECTION_ROTATION:g} rad: divide it into several bodies joined by fixed "
-            "joints, or make it stiffer"
+            f"linear modes hold below {SECTION_ROTATION:g} rad: " + body.remedy(excess)
         )
+        yield "rotation", excess, text
 
 
 def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
