@@ -27,12 +27,12 @@ from flexclear.dynamics.routines import store
 from flexclear.dynamics.routines.calls import RESULTS, SCENE, CallList, Cell, cells, routine
 from flexclear.dynamics.routines.store import load
 from flexclear.dynamics.routines.symbols import UndecidableError, branch, larger, smaller
-from flexclear.dynamics.run.evaluation import specialised_code
+from flexclear.dynamics.run.evaluation import engine, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
-from flexclear.dynamics.run.trajectory import integrate
+from flexclear.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
@@ -474,21 +474,35 @@ def long(scene: Scene) -> Engine:
         return engine_of(scene, {}, silent)
 
 
-def test_steps_of_long_mechanisms_run_on_routines(monkeypatch: pytest.MonkeyPatch) -> None:
-    engines, runs = [long(four_bars(3, 0.3)) for _ in range(2)], []
-    for alone, one in enumerate(engines):
-        with monkeypatch.context() as patch:
-            if alone:
-                patch.setattr(Engine, "has_routines", False)
+#: ways of steps, and what makes the engine take them
+WAYS: dict[str, tuple[str, Any]] = {
+    "kernels": ("INTERPRETED", True),
+    "list": ("address", lambda *given, **more: 0),
+    "straight code": ("SELECTIONS", 4),
+}
+
+
+def by_ways(scene: Scene) -> dict[str, Trajectory]:
+    """Runs of a scene whose steps evaluate in each way."""
+    engines, runs = {way: long(scene) for way in WAYS}, {}
+    for way, one in engines.items():
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(engine, *WAYS[way])
             assert not one.has_specialised_code
-            runs.append(integrate(one, consistent_start(one), silent))
-    assert [one.h[m.RATES] == one.h[m.EVALUATE] for one in engines] == [False, True]
-    assert len({int(one.n[m.EVALUATIONS]) for one in engines}) == 1
-    assert apart(runs[0].state, runs[1].state) < 1e-9
+            runs[way] = integrate(one, consistent_start(one), silent)
+        assert bool(one.h[m.CALLS]) == (way == "list")
+        assert (one.h[m.RATES] == one.h[m.EVALUATE]) == (way == "kernels")
+    return runs
 
 
-def test_a_list_belongs_to_the_rows_that_are_selected() -> None:
+def test_steps_of_long_mechanisms_run_on_routines() -> None:
+    runs = by_ways(four_bars(3, 0.3))
+    assert all(apart(run.state, runs["kernels"].state) < 1e-9 for run in runs.values())
+
+
+def test_a_list_belongs_to_the_rows_that_are_selected(monkeypatch: pytest.MonkeyPatch) -> None:
     """With rows that depend on others the same pose is singular."""
+    monkeypatch.setattr(engine, *WAYS["list"])
     one = long(load_scene(TREE / "scenes/checks/four_bars_2.toml"))
     y, lists, reports = consistent_start(one), [], []
     kept = one.selected.copy()

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 
 _making = Lock()
 #: joints, surfaces, loads and effects that routines know (`mechanics`, which is imported only to compile)
-KNOWN = set(
-    "fixed revolute prismatic cylindrical slot planar universal spherical rotation-vector free "
-    "clearance-spherical clearance-revolute clearance-slot ball-on-plane "
-    "joint-force joint-spring joint-friction joint-expression pid sampled-pid spring-damper line-expression bushing "
-    "point-force point-torque point-expression "
-    "stiffening stops gears bushings controllers joint_friction wear".split()
-)
+KNOWN = {
+    *("fixed", "revolute", "prismatic", "cylindrical", "slot", "planar", "universal", "spherical", "rotation-vector"),
+    *("free", "clearance-spherical", "clearance-revolute", "clearance-slot", "ball-on-plane", "joint-force"),
+    *("joint-spring", "joint-friction", "joint-expression", "pid", "sampled-pid", "spring-damper", "line-expression"),
+    *("bushing", "point-force", "point-torque", "point-expression", "stiffening", "stops", "gears", "bushings"),
+    *("controllers", "joint_friction", "wear"),
+}
 #: bearings with friction whose loads one routine finds: its code grows with their number cubed (16: 3 s of LLVM)
 MOST_BEARINGS = 16
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
