@@ -48,8 +48,11 @@ class Pressure(NamedTuple):
 
 @routine
 def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, b: End) -> Any:
-    """Return, of a bearing (`effects.joint_friction`), sliding velocity and bristles' rate; wrenches on both bodies, and on the second one at its frame, per
-    normal force; lost power per normal force [m/s]; axes of the frame that carries the bearing."""
+    """Return sliding velocity and bristles' rate of a bearing; wrenches on both bodies, and on the second one at its
+    frame, per normal force; lost power per normal force [m/s]; axes of the frame that carries the bearing.
+
+    bearing: see `effects.joint_friction`.
+    """
     F, G = carried(*a), carried(*b)
     R, r = (G if bearing.side else F).R_WB, G.p_WB - F.p_WB
     n, turning, sliding = R.column(bearing.axis), G.omega - F.omega, G.v - F.v - cross(F.omega, r)

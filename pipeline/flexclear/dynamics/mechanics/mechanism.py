@@ -116,8 +116,9 @@ class Link(Carrier):
     """A body with the joint that carries it. Its numbers are in memory.
 
     frame: of the joint, on the parent.  body: of a rigid body.  modes: of a flexible one.  rates: where those of its
-    positions and speeds are stored.  book: of the ledger, for its drives.  rubbed: True when bearings of its joint rub.  The others follow as `trees` has them;
-    closing: wrenches of the closures on it and all beyond, by rows, and the multipliers.
+    positions and speeds are stored.  book: of the ledger, for its drives.  rubbed: True when its joint rubs.  The
+    others follow as `trees` has them; closing: wrenches of the closures on it and all beyond, by rows, and the
+    multipliers.
     """
 
     frame: Frame
@@ -501,7 +502,7 @@ def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tup
 
 
 def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
-    """Return V = L^-1 J^T of a closure's rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
+    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
     found, waiting, loads = Spread({}, {}), dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
     S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
 
