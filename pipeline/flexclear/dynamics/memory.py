@@ -160,8 +160,8 @@ class Room:
 ) = _sizes(
     "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
     "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
-    "n_loads n_internal n_surfaces n_bodies n_frames n_components n_guards n_load_bends "
-    "n_load_numbers n_changes f_change w_change",
+    "n_loads n_internal n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_load_numbers n_changes "
+    "f_change w_change",
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))

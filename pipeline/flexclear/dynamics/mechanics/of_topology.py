@@ -10,9 +10,10 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
+from flexclear.dynamics.mechanics.evaluation import evaluated
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
 from flexclear.dynamics.mechanics.joints import JOINTS
-from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes, evaluated
+from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
@@ -23,7 +24,7 @@ from flexclear.dynamics.specialise.topology import Topology
 
 
 def list_of(parts: Parts, topology: Topology) -> CallList:
-    """Return the list of calls that evaluates a mechanism; see `mechanism.evaluated`."""
+    """Return the list of calls that evaluates a mechanism; see `evaluation.evaluated`."""
     return evaluated(mechanism_of(Tables(parts, topology)), CallList())
 
 
