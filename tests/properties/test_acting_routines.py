@@ -1,7 +1,6 @@
 """Routines of contacts, stops and loads compute what kernels do: of random mechanisms, in contact and out of it."""
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,23 +10,22 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact import surfaces as kinds_of_surfaces
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.normal import NORMAL_LAWS
-from flexclear.dynamics.mechanics import loads as acting
-from flexclear.dynamics.mechanics import surfaces
+from flexclear.dynamics.effects import EFFECTS
+from flexclear.dynamics.mechanics.joints import JOINTS
+from flexclear.dynamics.mechanics.loads import LOADS
+from flexclear.dynamics.mechanics.surfaces import SURFACES as SURFACES_OF_ROUTINES
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
-from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.specialised_code import has_routines
-from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.trajectory import integrate
+from flexclear.dynamics.run.evaluation import specialised_code
+from flexclear.dynamics.run.evaluation.specialised_code import KNOWN, has_routines
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
-from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.articulated_chains import Evaluated, bending, evaluated, rods, tabulated
 from tests.properties.mechanisms import GRAVITY, Table, two_loops
 from tests.properties.test_articulated import BENT, BOTH, FREE, ONE, UP_AND_DOWN, apart
 from tests.properties.test_dynamics_clearance import FRICTION, SURFACES
-from tests.properties.test_routines import ROUNDING, assert_alike, by_routines, long
+from tests.properties.test_routines import ROUNDING, assert_alike, by_routines, by_ways
 
 NUMBERS = range(24)
 #: by name, with keys that each demands
@@ -181,11 +179,11 @@ def test_every_surface_law_and_load_is_tried() -> None:
     assert kinds == set(kinds_of_loads.LOADS)
 
 
-@pytest.mark.parametrize("table", [surfaces.SURFACES, acting.LOADS], ids=["surfaces", "loads"])
-def test_kernels_serve_parts_that_routines_lack(table: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kernels_serve_parts_that_routines_lack(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert set().union(JOINTS, SURFACES_OF_ROUTINES, LOADS, (effect.name for effect in EFFECTS)) == KNOWN
     model = pressed(1).model
     assert has_routines(model)
-    monkeypatch.delitem(table, next(name for name in table if name in (*model.parts.surfaces, *model.parts.loads)))
+    monkeypatch.setattr(specialised_code, "KNOWN", KNOWN - {model.parts.surfaces[0]})
     assert not has_routines(model)
 
 
@@ -271,18 +269,11 @@ def test_joints_of_loops_rub_as_by_kernels(number: int) -> None:
 
 # Steps ----------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name", ["checks/clearance_pendulum", "checks/stops", "checks/rubbing_slider_crank"])
-def test_steps_in_contact_run_on_routines(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_in_contact_run_on_routines(name: str) -> None:
     """Events, guards and impact rates are as by kernels; steps between, where no force acts, follow rounding."""
-    scene, runs, engines = load_scene(TREE / f"scenes/{name}.toml"), [], []
-    scene = scene.model_copy(update={"time": scene.time.model_copy(update={"end": 0.1 * scene.time.end})})
-    for alone in (False, True):
-        one = long(scene)
-        with monkeypatch.context() as patch:
-            if alone:
-                patch.setattr(Engine, "has_routines", False)
-            runs.append(integrate(one, consistent_start(one), silent))
-        engines.append(one)
-    assert [one.h[m.RATES] == one.h[m.EVALUATE] for one in engines] == [False, True]
-    events = [np.array([one.events["time"], one.events["contact"], one.events["kind"]]) for one in runs]
-    assert events[0] == pytest.approx(events[1], abs=1e-9)
-    assert apart(runs[0].state, runs[1].state) < 1e-9
+    scene = load_scene(TREE / f"scenes/{name}.toml")
+    runs = by_ways(scene.model_copy(update={"time": scene.time.model_copy(update={"end": 0.1 * scene.time.end})}))
+    events = {way: np.array([one.events[key] for key in ("time", "contact", "kind")]) for way, one in runs.items()}
+    for way, run in runs.items():
+        assert events[way] == pytest.approx(events["kernels"], abs=1e-9)
+        assert apart(run.state, runs["kernels"].state) < 1e-9

@@ -15,8 +15,8 @@ The modes are eliminated before the coordinates of the body's joint, in the shap
 and their mass m = LL^T, K = P L^-T, and I becomes I - K K^T. A shape that moves the joint's frame in the body moves the
 body, and all that it carries, by a twist. All is about the origin of B, in axes of the world W where not said.
 
-Source: Shabana, *Dynamics of Multibody Systems*, ch. 5; Wang & Wang (2019), eqs. (2), (7)-(15). Stiffening: Kane, Ryan &
-Banerjee (1987), J. Guidance, Control, and Dynamics 10, 139-151; Wallrapp & Schwertassek (1991), International Journal
+Source: Shabana, *Dynamics of Multibody Systems*, ch. 5; Wang & Wang (2019), eqs. (2), (7)-(15). Stiffening: Kane, Ryan
+& Banerjee (1987), J. Guidance, Control, and Dynamics 10, 139-151; Wallrapp & Schwertassek (1991), International Journal
 for Numerical Methods in Engineering 32, 1833-1850. Held shapes: Craig & Bampton (1968), AIAA Journal 6, 1313-1319.
 """
 

@@ -28,10 +28,11 @@ class Relative(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A joint type. motion: Relative of positions and speeds.  rate: of the positions."""
+    """A joint type. motion: Relative of positions and speeds.  rate: of the positions, more by `redundant`."""
 
     motion: Callable[[Any, Any], Relative]
     rate: Callable[[Any, Any], Any] = lambda x, u: u
+    redundant: int = 0
 
 
 def about_z(angle: Any) -> Matrix:
@@ -144,7 +145,7 @@ JOINTS = {
     "slot": Joint(along(0, TURN)),
     "planar": Joint(along(0, 1, TURN)),
     "universal": Joint(by_two_turns),
-    "spherical": Joint(by_quaternion, quaternion_rate),
+    "spherical": Joint(by_quaternion, quaternion_rate, 1),
     "rotation-vector": Joint(by_rotation_vector),
-    "free": Joint(freely, lambda x, u: [*quaternion_rate(x[:4], u[:3]), *u[3:]]),
+    "free": Joint(freely, lambda x, u: [*quaternion_rate(x[:4], u[:3]), *u[3:]], 1),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ from flexclear.dynamics.mechanics.trees import (
     Step,
 )
 from flexclear.dynamics.mechanics.vectors import AT_REST, Twist, Wrench
-from flexclear.dynamics.routines.calls import CallList, Cell
+from flexclear.dynamics.routines.calls import Cell
 
 Cells = Sequence[Cell]
 
@@ -50,7 +50,7 @@ class Frame:
 
     @cached_property
     def deformed(self) -> tuple[Site, Columns]:
-        """Site on the body as that is deformed, and its motion per rate of each shape; once the body is placed."""
+        """Its site on the body as that is deformed, and its motion per rate of each shape; once the body is placed."""
         if isinstance(self.undeformed, Site):
             return self.undeformed, ()
         link, modes = self.carrier, self.carrier.modes
@@ -218,197 +218,3 @@ class Mechanism(NamedTuple):
     gravity: Cells
     ledger: Mapping[int, Cell]
     least_pivot: Cell
-
-
-def placed(mechanism: Mechanism) -> None:
-    """Compute the motion of all links, with the known part of their accelerations."""
-    mechanism.ground.motion = t.ground(mechanism.gravity)
-    for link in mechanism.links:
-        link.motion, link.step = t.place(link.kind, *link.frame.placed, link.coordinates)
-        if modes := link.modes:
-            given = modes.held, link.motion, link.step, modes.inboard, *modes.moving
-            link.motion, link.step, modes.twists = f.body_of(*given)
-
-
-def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
-    """Apply contacts and loads to all bodies; return powers by their books."""
-    powers, rigidly = list[tuple[int, Any]](), dict[Link, Wrench]()
-    for one in mechanism.actions:
-        ends = [frame.placed for frame in one.frames]
-        wrenches, supplied = calls.store(one.results, one.routine, *one.given, *ends)
-        for frame, wrench in zip(one.frames, wrenches, strict=False):
-            link = frame.carrier
-            if frame.deformed[1]:
-                frame.push(wrench)
-            elif isinstance(link, Link):
-                rigidly[link] = t.added(rigidly[link], wrench) if link in rigidly else wrench
-        powers += [(one.book + k, power) for k, power in enumerate(supplied) if power != 0.0]
-    for link, wrench in rigidly.items():
-        link.beyond.append((t.pushed(wrench), ()))
-    return powers
-
-
-def eliminated(mechanism: Mechanism) -> Any:
-    """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass."""
-    sound: Any = 1.0
-    for link in reversed(mechanism.links):
-        carried_on = int(link.on_link)
-        if modes := link.modes:
-            more: Any = [0.0] * len(modes.q)
-            for station in modes.stations:
-                more = f.bend(more, station, modes.q)
-            need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
-            modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
-        elif link.driven or link.rubbed:
-            link.rest = t.resist(link.motion, link.body, link.beyond)
-        if link.driven:
-            rest = t.carry(link.step, link.rest) if link.on_link else None
-        elif link.modes or link.rubbed:
-            rest, link.gains, link.forces, sound = t.free_joint(carried_on, link.rest, link.bounds, link.step, sound)
-        else:
-            given = carried_on, link.motion, link.body, link.bounds, link.step, link.beyond, sound
-            rest, link.gains, link.forces, sound = t.eliminate(*given)
-        if rest:
-            link.frame.resist(rest)
-    return sound
-
-
-class Spread(NamedTuple):
-    """Rows passed from their ends to the ground: V by what they move, and wrenches through joints that are watched."""
-
-    V: dict[Link | Modes, c.Rows]
-    through: dict[Link, c.Wrenches]
-
-
-class Loops(NamedTuple):
-    """Closures that are solved for: their rows passed to the ground, with their wrenches on the second body, and their
-    multipliers; the factor of their matrix, and its smallest pivot."""
-
-    found: dict[int, Spread]
-    on_second: dict[int, c.Wrenches]
-    multipliers: dict[int, t.Numbers]
-    L: c.Blocks
-    least: Any
-
-    def solved(self, right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
-        """Return the multipliers for right-hand sides."""
-        return dict(zip(self.found, c.solved(self.L, right), strict=True))
-
-
-def closed(mechanism: Mechanism, calls: CallList) -> Loops:
-    """Add the closures' forces to those of all links."""
-    found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
-    numbers, on_second = list[int](), dict[int, c.Wrenches]()
-    for number, one in enumerate(mechanism.closures):
-        kept, ends = len(one.scales), (frame.placed for frame in one.frames)
-        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *ends)
-        if not kept:
-            continue
-        i = len(found)
-        mine, gamma, S[i, i] = passed_inwards(list(zip(one.frames, wrenches, strict=True)), gamma)
-        for moved, V in mine.V.items():
-            for k in moved_by.setdefault(moved, []):
-                before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
-                S[i, k] = c.coupled(before, V, found[k].V[moved])
-            moved_by[moved].append(i)
-        found.append(mine)
-        right.append(gamma)
-        numbers.append(number)
-        on_second[number] = wrenches[1]
-    if not mechanism.closures:
-        return Loops({}, {}, {}, {}, 1.0)
-    L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
-    calls.write([mechanism.least_pivot], [least])
-    multipliers = dict(zip(numbers, c.solved(L, right), strict=True))
-    loops = Loops(dict(zip(numbers, found, strict=True)), on_second, multipliers, L, least)
-    for number, mine in loops.found.items():
-        for moved, V in mine.V.items():
-            moved.forces = c.with_multipliers(moved.forces, V, multipliers[number])
-        for link, on_it in mine.through.items():
-            link.closing.append((on_it, multipliers[number]))
-    return loops
-
-
-def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
-    """Compute the accelerations of all links from their forces; store the rates of the state, if there are calls."""
-    for link in mechanism.links:
-        if link.driven:
-            link.acceleration = t.follow(link.frame.acceleration, link.step)
-        else:
-            given = link.frame.acceleration, link.step, link.gains, link.forces
-            if calls:
-                link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
-            else:
-                _, link.acceleration = t.accelerate("fixed", Coordinates((), (), ()), *given)
-        if modes := link.modes:
-            on_shapes = modes.gains, modes.forces, link.acceleration
-            if calls:
-                to_modes = modes.basis, modes.body.T, modes.u
-                modes.accelerations = calls.store(modes.rates, f.accelerate, *to_modes, *on_shapes)
-            else:
-                _, modes.accelerations = f.accelerate((), (), (), *on_shapes)
-
-
-def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tuple[c.Blocks, Any]:
-    """Return the factor of J M^-1 J^T, lower blocks by two closures, and its smallest pivot; store its diagonals."""
-    rest, L, least = dict(S), c.Blocks(), 1.0
-    for j, one in enumerate(closures):
-        given = rest[j, j], [row[i] for i, row in enumerate(S[j, j])], one.scales, least
-        L[j, j], least = calls.store([*one.diagonal, *one.roots], c.cholesky, *given)
-        column = [i for i in range(j + 1, len(closures)) if (i, j) in rest]
-        for at, i in enumerate(column):
-            L[i, j] = c.below(rest[i, j], L[j, j])
-            for k in column[: at + 1]:
-                before = rest.get((i, k)) or [[0.0] * len(L[k, j])] * len(L[i, j])
-                rest[i, k] = c.eliminated(before, L[i, j], L[k, j])
-    return L, least
-
-
-def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
-    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
-    found, waiting, loads = Spread({}, {}), dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
-    S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
-
-    def receive(frame: Frame, wrenches: c.Wrenches) -> None:
-        link = frame.carrier
-        if isinstance(link, Link):
-            waiting[link] = c.together(waiting[link], wrenches) if link in waiting else wrenches
-            loads.setdefault(link, []).append((wrenches, frame.deformed[1]))
-
-    for frame, wrenches in ends:
-        receive(frame, wrenches)
-    while waiting:
-        link = max(waiting, key=lambda link: link.depth)
-        wrenches, carried_on = waiting.pop(link), int(link.on_link)
-        if modes := link.modes:
-            given = modes.gains, modes.forces, loads[link], wrenches, gamma, S
-            found.V[modes], gamma, S, wrenches = f.spread(*given)
-        if link.driven or link.rubbed:
-            found.through[link] = wrenches
-        if link.gains:
-            given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
-            found.V[link], gamma, S, passed = c.spread(*given)
-        else:
-            passed = c.inwards(link.step, wrenches) if carried_on else []
-        receive(link.frame, passed)
-    return found, gamma, S
-
-
-def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
-    """Return the powers of drives, and those lost to damping of modes, by their books."""
-    powers = list[tuple[int, Any]]()
-    for link in mechanism.links:
-        if link.driven:
-            given = link.step, link.rest, link.acceleration, link.closing, link.coordinates.u
-            powers.append((link.book, t.driving_power(*given)))
-        if modes := link.modes:
-            powers.append((modes.book, f.damping_power(modes.body.damping, modes.u)))
-    return powers
-
-
-def booked(mechanism: Mechanism, powers: Iterable[tuple[int, Any]]) -> list[Any]:
-    """Return the rates of the ledger's books: sums of powers."""
-    sums: dict[int, Any] = dict.fromkeys(mechanism.ledger, 0.0)
-    for book, power in powers:
-        sums[book] = t.added(sums[book], power) if sums[book] else power
-    return list(sums.values())

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.code import Program
@@ -72,6 +72,16 @@ class Call(NamedTuple):
 _building: ContextVar[CallList | None] = ContextVar("building", default=None)
 
 
+@contextmanager
+def inline() -> Iterator[None]:
+    """Let routines be parts of what calls them during the context."""
+    token = _building.set(None)
+    try:
+        yield
+    finally:
+        _building.reset(token)
+
+
 def routine(function: Callable) -> Callable:
     """Make a function a routine."""
 
@@ -87,9 +97,10 @@ def routine(function: Callable) -> Callable:
 class CallList:
     """A list of calls under construction.
 
-    size: number of results in memory; the first one is kept free, for what the list reports.
+    size: number of results in memory; the first one is kept free, for what the list reports, as a `number`.
     """
 
+    number: ClassVar[type] = float
     calls: list[Call] = field(default_factory=list)
     size: int = 1
     _kinds: dict[Any, _Kind] = field(default_factory=dict)
@@ -180,16 +191,14 @@ def _traced(
     function: Callable, arguments: Any, inside: list[Any], into: Sequence[Argument] | None, runs: tuple[str, ...]
 ) -> _Kind:
     """Trace a routine; inside: its numbers, symbolic ones by their run."""
-    tape, token = new_tape(), _building.set(None)
-    try:
-        symbols = [
-            tape.write(INTEGER if runs[int(a.run)] == MODES else FLOAT, "load", *a) if isinstance(a, Argument) else a
-            for a in inside
-        ]
+    tape = new_tape()
+    symbols = [
+        tape.write(INTEGER if runs[int(a.run)] == MODES else FLOAT, "load", *a) if isinstance(a, Argument) else a
+        for a in inside
+    ]
+    with inline():
         result = function(*rebuilt(arguments, iter(symbols)))
-    finally:
-        _building.reset(token)
-    first, rest = ((), result) if into is None else (result[0], result[1] if len(result) == 2 else result[1:])
+    first, rest = parted(result, into)
     stores = [(one.run, one.offset, value) for one, value in zip(into or (), leaves(first), strict=True)]
     given = {id(one): k for k, one in enumerate(symbols) if isinstance(one, Symbol)}
     places, slots = list[tuple[str, Any]](), dict[Symbol, int]()
@@ -203,6 +212,13 @@ def _traced(
     stores += [(str(len(runs)), slot, value) for value, slot in slots.items()]
     code = Code(function.__name__.lstrip("_"), Program(tape.block, stores), (*runs, RESULTS))
     return _Kind(code, rest, places, len(slots))
+
+
+def parted(result: Any, into: Sequence[Any] | None) -> tuple[Any, Any]:
+    """Return what is stored in given places, the first of several results, if there are such places, and the others."""
+    if into is None:
+        return (), result
+    return result[0], result[1] if len(result) == 2 else result[1:]
 
 
 def _shape(tree: Any) -> Any:

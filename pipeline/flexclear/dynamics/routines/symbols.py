@@ -27,9 +27,9 @@ def _undecidable(condition: Symbol) -> bool:
     )
 
 
-def new_tape() -> Tape:
-    """Return an empty tape without limit of length."""
-    return Tape(_undecidable, sys.maxsize)
+def new_tape(longest: int = sys.maxsize) -> Tape:
+    """Return an empty tape; longest: most operations."""
+    return Tape(_undecidable, longest)
 
 
 def _function(name: str, plain: Callable) -> Callable[..., Any]:
