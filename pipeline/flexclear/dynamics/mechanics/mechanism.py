@@ -50,7 +50,7 @@ class Frame:
 
     @cached_property
     def deformed(self) -> tuple[Site, Columns]:
-        """Its site on the body as that is deformed, and its motion per rate of each shape; once the body is placed."""
+        """Site on the body as that is deformed, and its motion per rate of each shape; once the body is placed."""
         if isinstance(self.undeformed, Site):
             return self.undeformed, ()
         link, modes = self.carrier, self.carrier.modes
