@@ -22,4 +22,5 @@ NAMES = {
     "plan": "plan:FAMILY",
     "effects": "effects:FAMILY",
     "turning": "turning:FAMILY",
+    "robots": "robots:FAMILY",
 }

@@ -29,6 +29,7 @@ DATASETS: dict[str, tuple[str, Schema]] = {
         "largest rate [1/s] at which a small motion grows, 0 where the state is stable",
         artifacts.LINEAR,
     ),
+    "State space": ("from `flexclear export --format state-space` and `flexclear.state_space`", artifacts.STATE_SPACE),
     "Campbell diagram": ("from `flexclear frequencies --speeds`", artifacts.CAMPBELL),
     "Sections": ("from `flexclear sections`", artifacts.SECTIONS),
     "Verdict": ("from `flexclear sections`", VERDICT),

@@ -25,8 +25,10 @@ __all__ = [
     "effects",
     "equilibrium",
     "exit_code",
+    "export",
     "frequencies",
     "load_scene",
+    "new",
     "open",
     "plan",
     "quantity",
@@ -36,8 +38,10 @@ __all__ = [
     "sections",
     "sensitivities",
     "show",
+    "simulation",
     "stability",
     "stage",
+    "state_space",
     "sweep",
 ]
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from flexclear.scene import load
 from flexclear.scene.schema import Scene
-from flexclear.stages import scenes
+from flexclear.stages import formats, new_scene, scenes
 from flexclear.stages import show as start_pose
 from flexclear.stages.graph import Graph
 from flexclear.stages.single_stage import Step, single_stage
@@ -36,6 +36,8 @@ from flexclear.workflow.program import exit_code as exit_code
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from flexclear.dynamics.stepwise import Simulation
 
 __version__ = version()
 
@@ -65,6 +67,17 @@ def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
     return load.edited(scene, changes)
 
 
+def new(source: str | Path, folder: str | Path = ".") -> Path:
+    """Write a commented scene to start from into a folder and return its path.
+
+    source: a kind of mechanism, as ``flexclear new`` lists them, or a robot's file, URDF or MJCF; that needs the extra
+    ``robots``. The head of the scene lists what it does not take over.  Raises FlexclearError.
+    """
+    if source in new_scene.KINDS:
+        return new_scene.write(str(source), Path(folder))[0]
+    return new_scene.write_from(Path(source), Path(folder))[0][0]
+
+
 def run(scene: Scene | str | Path) -> xr.Dataset:
     """Run a scene and return the dataset of the simulate stage (schema RUN), from the cache when fresh.
 
@@ -76,6 +89,28 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
     0.1959
     """
     return scenes.run(_loaded(scene))
+
+
+def simulation(scene: Scene | str | Path) -> Simulation:
+    """Begin a motion that advances in steps of your own, for controllers and forces in Python and for co-simulation.
+
+    `advance(1e-3)` goes on by a duration [s], with steps as short as accuracy, contacts and events inside need; `time`
+    is the present time.  `inputs["load.push"] = 3.0` sets a force, torque, set point or motion that the scene gives as
+    a number, in SI or as text with a unit, and `inputs` lists them.  `read("slider.position")` evaluates a quantity as
+    `[view] watch` names it, `equations()` mass matrix, bias forces and closures, `jacobian("slider.velocity")` a
+    velocity's change per free speed.  `state` is a value of bytes: set it to go back, to the last bit, in this or
+    another process.  A simulation is a context, or ends with `close()`.
+    Raises FlexclearError: InputError for wrong names and values, SolverError where the motion cannot continue.
+
+    >>> import flexclear as fc
+    >>> with fc.simulation("scenes/checks/pendulum.toml") as sim:
+    ...     sim.advance(0.2)
+    ...     round(sim.read("hinge.position"), 4)  # [rad]
+    0.1959
+    """
+    from flexclear.stages.stepping import begin
+
+    return begin(_loaded(scene), open_workplace())
 
 
 def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:
@@ -234,6 +269,35 @@ def frequencies(
     (1.5836, 0.1)
     """
     return scenes.linear(_loaded(scene), time, drives=drives, moving=moving, speeds=speeds, drive=drive)
+
+
+def state_space(
+    scene: Scene | str | Path,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    *,
+    held: bool = False,
+) -> xr.Dataset:
+    """Return matrices A, B, C, D of small motions about `equilibrium` (schema STATE_SPACE), in changes from there.
+
+    Inputs are the values of loads, references of controllers and forces of drives; outputs the watched quantities.
+    time, drives, errors: see `equilibrium`.  held: the drives hold their positions, and their forces are no inputs.
+
+    >>> import flexclear as fc
+    >>> fc.state_space("scenes/checks/oscillator.toml")["A"].values.round(9).tolist()
+    [[0.0, 1.0], [-100.0, -2.0]]
+    """
+    return scenes.linear(_loaded(scene), time, task="state_space", drives=drives, held=held)
+
+
+def export(scene: Scene | str | Path, format: str, target: str | Path | None = None, **options: Any) -> str:
+    """Write a scene for another program, as ``flexclear export`` does, and return what it prints.
+
+    format: "state-space" or "loads".  target: file, by default one named like the scene in the current folder.
+    options: `at` [s], `held` and `body` of the command.  Raises FlexclearError.
+    """
+    path = None if target is None else Path(target)
+    return formats.write(_loaded(scene), format, path, options, open_workplace())
 
 
 def compare(

@@ -17,6 +17,7 @@ import scipy.linalg
 import scipy.sparse
 import xarray as xr
 
+import flexclear as fc
 from flexclear.artifacts.deficits import table
 from flexclear.commands.__main__ import main
 from flexclear.structure.fe.exchange import ansys, files, nodes, programs
@@ -385,3 +386,60 @@ def test_the_command_prints_the_body_and_refuses_damage(
     assert main(["run", str(tmp_path / "s.toml"), "--to", "bundle"]) == 2
     told = capsys.readouterr().err
     assert "'block.mas' has no diagonal entry in row" in told or "'block.mas' holds no matrix" in told
+
+
+# Loads for the program ---------------------------------------------------------------------------------------------
+
+CLAMPED = """title = "clamped block"
+time.end = "1 s"
+start.at = "equilibrium"
+output.interval = "0.5 s"
+body.ground = { type = "ground", frames.wall = {} }
+body.part = { type = "flexible", mesh = "part.toml", modes = { reference = "craig-bampton", up_to = "20 kHz" } }
+joint.wall = { type = "fixed", between = ["ground.wall", "part.start"] }
+load.push = { type = "point-force", frame = "part.end", force = ["-5 N", "3 N", "-2 N"] }
+load.twist = { type = "point-torque", frame = "part.end", torque = ["0.2 N m", 0, "0.1 N m"] }
+"""
+
+
+@needs_ccx
+def test_calculix_bends_the_body_under_exported_loads_as_this_program_does(
+    part: Path, solid: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Loads on both ends balance, so a statically determinate support has no reaction; START's mean motion is zero."""
+    monkeypatch.chdir(tmp_path)
+    lines = [f'{name} = "{part / value}"' for name, value in CALCULIX.items()]
+    frames = "".join(f'[frames.{name}]\nset = "{name.upper()}"\n' for name in ("start", "end"))
+    head = 'interfaces = ["start", "end"]\n[shape]\ntype = "matrices"\nunits = "mm-t-s"\n'
+    Path("part.toml").write_text("\n".join([head, *lines, frames]))
+    Path("clamped.toml").write_text(CLAMPED)
+    assert main(["export", "-q", "clamped.toml", "--format", "loads", "--at", "0", "--out", "loads.inp"]) == 0
+    assert "loads on start, end of part at 0 s, in mm-t-s" in capsys.readouterr().out
+    X = solid["node_position"].values * 1e3
+    nodes = {name: np.flatnonzero(np.abs(X[:, 0] - x) < 1e-6) for name, x in (("START", 0.0), ("END", 100.0))}
+    places = ((50.0, 0.0, 0.0), (50.0, 20.0, 0.0), (50.0, 0.0, 30.0))  # away from the loads
+    corner, along, across = (int(np.argmin(np.abs(X - at).sum(axis=1))) + 1 for at in places)
+    held = f"*NSET, NSET=HELD\n{corner}, {along}, {across}\n"
+    held += f"*BOUNDARY\n{corner}, 1, 3\n{along}, 1\n{along}, 3\n{across}, 1\n"
+    text = deck(solid, "*STATIC").partition("*STEP")[0]
+    prints = "".join(f"*NODE PRINT, NSET={name}\nU\n" for name in nodes) + "*NODE PRINT, NSET=HELD\nRF\n"
+    Path("static.inp").write_text(f"{text}{held}*STEP\n*STATIC\n*INCLUDE, INPUT=loads.inp\n{prints}*END STEP\n")
+    subprocess.run(["ccx", "static"], check=True, capture_output=True, timeout=300)
+    found = [block.splitlines()[2:] for block in Path("static.dat").read_text().split("for set")[1:]]
+    rows = [[line.split() for line in block if len(line.split()) == 4] for block in found]
+    start, end, reactions = ({int(k): np.array(values, float) for k, *values in block} for block in rows)
+    assert max(np.abs(r).max() for r in reactions.values()) < 2e-3 * 5.0  # moments of loads on displaced ends
+
+    def motion(moved: dict[int, np.ndarray], name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Centre, mean displacement and rotation of a set of nodes, by least squares."""
+        x, u = X[nodes[name]], np.array([moved[k + 1] for k in nodes[name]])
+        r, shift = x - x.mean(axis=0), u.mean(axis=0)
+        spin = np.vstack([[[0.0, c, -b], [-c, 0.0, a], [b, -a, 0.0]] for a, b, c in r])
+        return x.mean(axis=0), shift, np.linalg.lstsq(spin, (u - shift).ravel(), rcond=None)[0]
+
+    (at, shift, turn), (tip, moved, _) = motion(start, "START"), motion(end, "END")
+    theirs = moved - shift - np.cross(turn, tip - at)
+    ends = fc.run("clamped.toml")["frame_position"].sel(frame=["part.start", "part.end"]).values[0]
+    ours = 1e3 * (ends[1] - ends[0]) - (tip - at)
+    # seven digits in its listing; loads act on the displaced end here, by 1e-4 of the length
+    np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=3e-4 * np.abs(ours).max())

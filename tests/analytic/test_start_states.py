@@ -140,7 +140,7 @@ def test_a_beam_held_at_an_angle_sags_and_is_let_go_from_there() -> None:
 
 def test_what_rounding_leaves_of_a_state_is_zero_in_the_scene_that_begins_there() -> None:
     """Scenes take no number below 1e-50: a modal rate of 5e-79 comes of rounding alone."""
-    assert snapshot._given(np.array([5e-79, -3e-60, 1e-20, -2.0])) == [0.0, 0.0, 1e-20, -2.0]
+    assert snapshot.writable(np.array([5e-79, -3e-60, 1e-20, -2.0])) == [0.0, 0.0, 1e-20, -2.0]
 
 
 # On a stop, at rest ---------------------------------------------------------------------------------------------------

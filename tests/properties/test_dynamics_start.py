@@ -7,16 +7,39 @@ import numpy as np
 import pytest
 
 from flexclear import dynamics
+from flexclear.dynamics.equations.observation import Observed
+from flexclear.dynamics.events.impulse import apply_impulses
 from flexclear.dynamics.model.assembly import assembled
 from flexclear.dynamics.model.given_start import corrected_starts
 from flexclear.dynamics.model.mechanism import Mechanism, build
+from flexclear.dynamics.model.mobility import analyse
+from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.run.coordinates import joint_coordinates
+from flexclear.dynamics.run.evaluation.engine import prepare
+from flexclear.dynamics.run.evaluation.observation import observe, rows_of
+from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.evaluation.without_compiler import uncompiled
+from flexclear.dynamics.run.run import engine_of
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError
+from flexclear.system.progress import silent
 from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import body, frame, ground, joint, rigid, scene, simulate, two_loops
+from tests.properties.mechanisms import (
+    Table,
+    body,
+    frame,
+    ground,
+    joint,
+    matrix,
+    rigid,
+    scene,
+    simulate,
+    turned,
+    two_loops,
+)
 
 
 @pytest.mark.slow
@@ -234,3 +257,89 @@ def test_a_mended_start_is_in_the_runs_warnings_and_velocities_follow_the_mend()
     assert rough.angular_velocity.sel(body="crank").values[0] == pytest.approx([0.0, 0.0, 3.0], abs=1e-12)
     with pytest.raises(InputError, match=r"given velocities of crank \(the error is 1 of"):
         simulate(driven(1.5, 1.5, angular_velocity=[0.0, 0.0, 4.0]))
+
+
+@pytest.mark.parametrize("name", ["bennett", "expressions", "gears", "rubbing_slider_crank", "socket_rolling", "stops"])
+def test_without_a_compiler_a_start_has_the_same_state_and_outputs(name: str) -> None:
+    model = tabulate(build(load_scene(f"scenes/checks/{name}.toml"), {}))
+    seen = list[Observed]()
+    for engine in (prepare(model, silent), uncompiled(model, analyse(model))):
+        y = consistent_start(engine)
+        seen.append(observe(engine, rows_of(engine, y[None], engine.start), after=True))
+    # both evaluate the same sums, in another order
+    for field in ("state", "accelerations", "energy", "drive_force"):
+        ours, other = (getattr(one, field) for one in seen)
+        if field == "energy":
+            ours, other = (np.stack([each[k] for k in each.dtype.names]) for each in (ours, other))
+        assert other == pytest.approx(ours, rel=1e-8, abs=1e-10 * max(1.0, float(np.abs(ours).max(initial=0.0))))
+
+
+def oblique(turn: Any = (0.0, 0.0, 0.7)) -> Table:
+    """A four-bar about axes along z, in a plane turned about these, and next to it a slider of 1e-11 kg."""
+    R = matrix(turn)
+    A, B, C = turned(R, (0.05, 0.12, 0.0)), turned(R, (0.34, 0.2, 0.0)), turned(R, (0.3, 0.0, 0.0))
+
+    def bar(a: list[float], b: list[float]) -> Table:
+        far = [y - x for x, y in zip(a, b, strict=True)]
+        return rigid(1.0, 1e-2, {"a": {}, "b": frame(far)}, pose={"position": a})
+
+    bodies = {
+        "g": {"type": "ground", "frames": {"a": {}, "c": frame(C), "s": frame((1.0, 0.0, 0.0), (0.4, 0.9, 0.3))}},
+        "crank": bar([0.0, 0.0, 0.0], A),
+        "rod": bar(A, B),
+        "rocker": bar(C, B),
+        "s": rigid(1e-11, 1e-15, {"a": frame((0.0, 0.0, 0.0), (0.4, 0.9, 0.3))}, pose={"position": [1.0, 0.0, 0.0]}),
+    }
+    joints = {
+        "O": joint("revolute", "g.a", "crank.a"),
+        "A": joint("revolute", "crank.b", "rod.a"),
+        "B": joint("revolute", "rod.b", "rocker.b"),
+        "C": joint("revolute", "g.c", "rocker.a"),
+        "s": joint("prismatic", "g.s", "s.a"),
+    }
+    return scene(bodies, joints)
+
+
+def test_impulses_on_coordinates_that_depend_on_each_other_are_the_least() -> None:
+    """Where the second rate follows from the first, the motion is that of the first alone, and nothing else moves."""
+    engine = engine_of(Scene.model_validate(oblique()), {}, silent)
+    y, model = consistent_start(engine), engine.model
+
+    def rates(state: np.ndarray) -> dict[str, float]:
+        seen = observe(engine, rows_of(engine, state[None], engine.start), after=True)
+        return {name: float(rate[0]) for name, (_, rate, _) in joint_coordinates(model, seen).items()}
+
+    alone = apply_impulses(engine, y, 0.0, {"O": 1.0})
+    moved = rates(alone.y)
+    assert (moved["O"], moved["s"]) == (pytest.approx(1.0), pytest.approx(0.0, abs=1e-9))
+    both = apply_impulses(engine, y, 0.0, {"O": 1.0, "C": moved["C"]})
+    assert both.y == pytest.approx(alone.y, abs=1e-9)
+    # shared so that the sum of their squares is least
+    share = alone.impulses["O"] / (1.0 + moved["C"] ** 2)
+    assert both.impulses == pytest.approx({"O": share, "C": moved["C"] * share}, rel=1e-9)
+    # next to bars of 1 kg: singular values in a ratio of some 1e5
+    together = rates(apply_impulses(engine, y, 0.0, {"O": 1.0, "s": 1.0}).y)
+    assert (together["O"], together["s"]) == (pytest.approx(1.0, rel=1e-9), pytest.approx(1.0, rel=1e-9))
+
+
+def test_joints_share_a_self_stress_however_little_and_others_do_not() -> None:
+    """A bar on two balls 1e-4 of its length apart, held by a strut at its end, carries 1e-4 of their forces there.
+
+    A loop of four hinges is redundant in space, the slide that carries both is not: what it holds is rounding.
+    """
+    table = oblique((0.0, 0.0, 0.7))
+    slide = {"a": table["body"]["s"]["frames"]["a"] | {"position": [1.0, 0.0, 0.0]}, "o": {}}
+    slide |= {"c": table["body"]["g"]["frames"]["c"], "p": frame((0.0, 0.0, 2.0)), "q": frame((1e-4, 0.0, 2.0))}
+    table["body"]["s"] |= {"frames": slide | {"r": frame((1.0, 0.5, 2.0))}, "pose": {}}
+    table["joint"]["O"]["between"][0], table["joint"]["C"]["between"][0] = "s.o", "s.c"
+    bar = {"p": {}, "q": frame((1e-4, 0.0, 0.0)), "r": frame((1.0, 0.0, 0.0))}
+    table["body"]["bar"] = rigid(1.0, 1e-2, bar, pose={"position": [0.0, 0.0, 2.0]})
+    strut = {"a": {}, "b": frame((0.0, 0.5, 0.0))}
+    table["body"]["strut"] = rigid(1.0, 1e-2, strut, pose={"position": [1.0, 0.0, 2.0]})
+    table["joint"] |= {
+        "p": joint("spherical", "s.p", "bar.p"), "q": joint("spherical", "s.q", "bar.q"),
+        "r": joint("spherical", "bar.r", "strut.a"), "e": joint("spherical", "strut.b", "s.r"),
+    }  # fmt: skip
+    found = analyse(tabulate(build(Scene.model_validate(table), {})))
+    assert found.redundant_joints == {"O", "A", "B", "C", "p", "q", "r", "e"}
+    assert found.redundant == 3 + 2

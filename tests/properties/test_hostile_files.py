@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from flexclear.artifacts import maintenance
 from flexclear.artifacts.disk import checked, read_checked, sha256
@@ -23,6 +24,7 @@ from flexclear.artifacts.store import Store, read_record
 from flexclear.post.render import forms
 from flexclear.scene.load import load_scene
 from flexclear.scene.sweep import read_sweep
+from flexclear.scene.tables import LookupTable
 from flexclear.stages import scenes
 from flexclear.stages.graph import Graph
 from flexclear.structure.fe.exchange import files
@@ -320,3 +322,42 @@ def test_a_result_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FlexclearError, match="is not a dataset") as caught:
         store.load(found)
     assert not isinstance(caught.value, InputError)
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("v,F\n0,0\n1,nan\n", "values that are no finite numbers"),
+        ("v,F\n0,0\n1e999,1\n", "values that are no finite numbers"),
+        ("v,F\n0,0\n1\n", "row 3 of damper.csv has no numbers in columns 1 and 2"),
+        ("v,F\n0,0\n2,1\n1,2\n", r"'v' of damper.csv must increase from point to point; point 3 does not"),
+        ("v,F\n0,0\n0,1\n", "1 values of 'v'; a table needs at least two"),
+        ("v;F\n0,5;1,5\n1,5;2,5\n", "no column 'v'"),
+        ("v,F\n", "0 values of 'v'"),
+        ("", "no column 'v'"),
+        ("v,F\n" + "".join(f"{k},{k}\n" for k in range(5001)), "has 5001 points; a table has at most 5000"),
+        ("v,F\n" + "1,1\n" * 4_200_000, "larger than 16 MB"),
+        ("v,F\n0,0\n1," + "9" * 200_000 + "\n", "cannot be read|no finite numbers"),
+        ("\x00\x00\x00\x00", "cannot be read|no column"),
+    ],
+    ids=["nan", "overflow", "ragged", "falls", "twice", "locale", "header", "empty", "many", "huge", "long", "binary"],
+)
+def test_a_damaged_table_of_a_load_is_refused_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "damper.csv").write_text(text)
+    columns = {"of": {"column": "v", "unit": "m/s"}, "value": {"column": "F", "unit": "N"}}
+    with pytest.raises(ValidationError, match=words) as refused:
+        LookupTable.model_validate({"file": str(tmp_path / "damper.csv"), **columns})
+    assert len(refused.value.errors()) == 1
+    assert len(str(refused.value)) < 1000
+
+
+def test_a_grid_with_a_missing_pair_is_refused_and_a_file_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    path, columns = tmp_path / "map.csv", [{"column": name, "unit": "m"} for name in ("x", "y")]
+    rows = [f"{x},{y},1" for x in range(3) for y in range(2)]
+    given = {"file": str(path), "of": columns, "value": {"column": "z", "unit": "N"}}
+    path.write_text("\n".join(["x,y,z", *rows]), encoding="utf-8-sig")
+    assert LookupTable.model_validate(given).levels() == (1, 0)
+    for text in (rows[:-1], [*rows[:-1], rows[0]]):
+        path.write_text("\n".join(["x,y,z", *text]))
+        with pytest.raises(ValidationError, match=r"rows for 3 x 2 values of 'x' and 'y'; give every pair one row"):
+            LookupTable.model_validate(given)

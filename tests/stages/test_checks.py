@@ -128,6 +128,32 @@ WRONG = {
             "load.l.stiffness": ('stiffness = "4 N m/rad"', "'4.0 N m/rad' is a torsional stiffness"),
         },
     ),
+    "pin of metres": (
+        {'pin_radius = "8 mm"': "pin_radius = 8"},
+        "",
+        {"joint.B.pin_radius": ("pin_radius", "8 m is more than ten times the size of the mechanism")},
+    ),
+    "velocities that the joints forbid": (
+        {"frames.B = {}": "frames.B = {}\nvelocity = [0, 1, 0]"},
+        "",
+        # the guide is along x
+        {"body.slider.velocity": ("velocity = ", "joints and drives do not allow the given velocities of slider")},
+    ),
+    "events that are true at the start": (
+        {
+            'at = "ideal"\n': "",
+            'type = "clearance-revolute"': 'type = "revolute"',
+            'clearance = "0.1 mm"\npin_radius = "8 mm"\nlength = "16 mm"\n': "",
+            'normal = { law = "flores", restitution = 0.8, stiffness = 1e9 }\n': "",
+        },
+        '[event.a]\nat = "O.position > 39 deg"\nrelease = "joint.A"\n'
+        '[event.b]\nat = "slider.position.x < 0.3 m"\nrelease = "joint.guide"\n'
+        '[event.c]\nat = "slider.position.x > 0.3 m"\nrelease = "load.gravity"\n',
+        {
+            "event.a.at": ('at = "O.', "'O.position > 39 deg' is already true at the start of the run"),
+            "event.b.at": ('at = "slider.position.x < ', "'slider.position.x < 0.3 m' is already true"),
+        },
+    ),
     "angle without digits": (
         {'"polynomial", coefficients = ["40 deg", "300 rpm"]': '"harmonic", amplitude = 1, frequency = "1e30 Hz"'},
         "",
@@ -159,8 +185,8 @@ def test_check_and_run_report_the_same_errors_with_file_and_line(
     [
         (
             'pin_radius = "8 mm"',
-            "pin_radius = 8",
-            "[joint.B.pin_radius], line 41: 8 m is more than the size of the mech",
+            'pin_radius = "0.8 m"',
+            "[joint.B.pin_radius], line 41: 0.8 m is more than the size of the mech",
         ),
         (
             '[0, "-9.81 m/s^2", 0]',

@@ -28,6 +28,8 @@ body? | body | | name of the body
 ensemble_body? | ensemble_body | | name of the body whose motion the ensemble records
 frame? | frame | | name of the frame; of a mechanism body.frame
 frame_body? | frame | | body that the frame is fixed to
+loaded_frame? | loaded_frame | | frame of a flexible body, body.frame
+loaded_body? | loaded_body | | flexible body whose loads are recorded
 frame_held? | frame_held | | frame that is held
 joint? | joint | | name of the joint
 joint_type? | joint | | type of the joint
@@ -38,6 +40,7 @@ joint_second_body? | joint | | body of the second frame
 coordinate? | coordinate | | joint, or joint.coordinate where the joint has several
 coordinate_joint? | coordinate | | name of the coordinate's joint
 coordinate_motion? | coordinate | | {_MOTION}
+internal? | internal | | part and number of the internal state
 drive? | drive | | name of the drive, of its coordinate, or of an actuator
 drive_motion? | drive | | {_MOTION}
 load? | load | | name of the load
@@ -57,6 +60,10 @@ worn? | worn | | name of the contact that wears
 band? | band | 1 | number of the band of equal height on a sphere, from its lower pole on
 sector? | sector | 1 | number of the sector about z of the surface's frame, from x on
 pass_joint? | singular_pass | | joint on whose coordinate the branches differ most
+state? | state | | coordinate, its rate, or an internal state of a part
+state2? | state2 | | coordinate, its rate, or an internal state of a part
+input? | input | | key of a load whose value is the input
+output? | output | | watched quantity, or its component
 mode? | mode | | body.number; in the files of one body, the number of the mode
 mode2? | mode2 | 1 | number of the mode
 mode_body? | mode | | body that the mode belongs to

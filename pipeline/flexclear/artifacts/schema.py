@@ -274,6 +274,19 @@ critical_speed~ | branch | rad s-1 | lowest speed at which the whirl frequency e
 frame_position~ | speed frame axis | m | origin of the named frame in steady motion, world axes
 """)
 
+#: state space about an equilibrium, in changes from there; units of the entries follow from those of rows and columns
+STATE_SPACE: Schema = table("""
+A | state state2 | 1 | rates of the states per state
+B | state input | 1 | rates of the states per input
+C | output state | 1 | outputs per state
+D | output input | 1 | outputs per input
+input_value | input | 1 | value of the input at the equilibrium, in its unit
+output_value | output | 1 | value of the output at the equilibrium, in its unit
+state_unit | state | | SI unit of the state
+input_unit | input | | SI unit of the input
+output_unit | output | | SI unit of the output
+""")
+
 
 #: variables that become coordinates of their dimension, where their schema has them
 _NAMING = ("event_time", "event_contact", "event_kind", "impact_time", "impact_contact")

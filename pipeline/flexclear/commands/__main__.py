@@ -33,6 +33,7 @@ COMMANDS = {
     "effects": "measure how each part changes each quantity, alone and in pairs",
     "sections": "classify a repeated motion as periodic, quasi-periodic or chaotic",
     "frequencies": "compute an equilibrium and its natural frequencies",
+    "export": "write a scene for other programs: FMU, state space, loads on a flexible body",
     "report": "write the page of scenes: answers, film, figures, assumptions, cost",
     "schema": "print a JSON schema of scenes, recipes or sweeps",
     "cite": "list the sources of the methods and data that a scene uses",

@@ -9,6 +9,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
@@ -37,9 +38,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.dynamics.model.mechanism import Mechanism
+    from flexclear.dynamics.model.mobility import Mobility
+    from flexclear.dynamics.model.model import Model
     from flexclear.scene.parts import FlexibleBody
     from flexclear.scene.schema import Scene
-    from flexclear.structure.fe.model import Model
+    from flexclear.structure.fe import model as fe
 
 #: errors about a file: it is wrong, or asks for too much
 MISTAKES = (InputError, ResourceError)
@@ -47,6 +50,8 @@ MISTAKES = (InputError, ResourceError)
 LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
 #: extents of a mesh from a file outside of which its unit of length is doubted [m]
 SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
+#: the start of mechanisms with more free coordinates is checked by the run only
+MOST_COORDINATES = 60
 #: parts without which the start pose of a mechanism is another
 PLACING = ("[drive.", "[start.", "[gear.")
 #: number of unused frames that are listed
@@ -211,7 +216,7 @@ def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
 class Body:
     """A mesh without its modes.  rigid: mass, inertia and frames (schema RIGID).  interfaces: those of the recipe."""
 
-    model: Model
+    model: fe.Model
     rigid: xr.Dataset
     interfaces: tuple[str, ...]
 
@@ -316,15 +321,16 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
 
         model = tabulate(mechanism)
         mechanism, mobility = model.mechanism, analyse(model)
-        try:
+        with _as_mistakes():
             refuse_singular(model, mobility)
-        except SolverError as error:
-            raise InputError("[start]", str(error)) from None
     else:
         from flexclear.dynamics.model.assembly import assembled
 
         mechanism = assembled(mechanism)
-    refuse(start_errors(mechanism, final=whole.start is None or whole.start.at != "equilibrium"))
+    exact = whole.start is None or whole.start.at != "equilibrium"
+    refuse(start_errors(mechanism, final=exact))
+    if mechanism.all_rigid and sound and exact and model.nv <= MOST_COORDINATES:
+        _started(whole, model, mobility, findings)
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):
@@ -333,6 +339,23 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
         findings.notes.append(f"unused frames: {', '.join(unused[:LISTED_FRAMES])}{more}")
+
+
+@contextmanager
+def _as_mistakes() -> Iterator[None]:
+    """Turn errors that the run would meet at its start into errors of the scene."""
+    try:
+        yield
+    except SolverError as error:
+        raise InputError("[start]", str(error)) from None
+
+
+def _started(whole: Scene, model: Model, mobility: Mobility, findings: Findings) -> None:
+    """Check what the run refuses at its start, all of which is collected."""
+    from flexclear.dynamics.analyses import start_refusals
+
+    for check in start_refusals(whole, model, mobility):
+        findings.attempt(_as_mistakes()(check), whole.path)
 
 
 def _starts_ideal(whole: Scene) -> bool:

@@ -1,28 +1,20 @@
-"""``flexclear new``: a commented scene to start from, with its mesh recipes, in a folder of the user's."""
+"""``flexclear new``: a commented scene to start from, with its mesh recipes or surfaces, in a folder of the user's."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from flexclear.artifacts.paths import PACKAGE
-from flexclear.system.errors import InputError, ResourceError
-
-TEMPLATES = PACKAGE / "stages" / "templates"
-#: kinds of mechanisms -> their descriptions
-KINDS = {
-    "four-bar": "planar linkage of rigid bodies with one loose pin",
-    "slider-crank": "flexible connecting rod, clearance at the crank pin",
-    "pendulum": "one rigid body on a hinge",
-    "leg": "spatial leg with a driven flexible rod and a loose ball joint",
-    "empty": "the skeleton of a scene",
-}
+from flexclear.scene.registry import suggestion
+from flexclear.stages.new_scene import KINDS, write, write_from
+from flexclear.stages.new_scene import TEMPLATES as TEMPLATES
+from flexclear.system.errors import InputError
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     message = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
-    parser.add_argument("kind", choices=list(KINDS), metavar="KIND", help=message)
+    parser.add_argument("kind", nargs="?", metavar="KIND", help=message)
     parser.add_argument(
         "folder",
         nargs="?",
@@ -31,13 +23,26 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="folder to write to (default: the current one)",
     )
+    message = "another program's file instead of KIND (URDF, MJCF, STEP): flexclear new --from robot.urdf FOLDER"
+    parser.add_argument("--from", type=Path, dest="source", metavar="FILE", help=message)
 
 
 def command(options: argparse.Namespace) -> None:
     """Write the files and print the next commands."""
-    files = write(options.kind, options.folder)
-    print(f"wrote {', '.join(str(path) for path in files)}")
+    lost: list[str] = []
+    if options.source is not None:  # KIND is then the folder
+        files, lost = write_from(options.source, Path(options.kind or ""))
+    elif options.kind in KINDS:
+        files = write(options.kind, options.folder)
+    else:
+        raise InputError(
+            options.kind or "new", "is not a kind of mechanism", suggestion(options.kind or "", list(KINDS))
+        )
+    several = f" and {len(files) - 4} more" if len(files) > 4 else ""
+    print(f"wrote {', '.join(str(path) for path in files[:4])}{several}")
     scene = files[0]
+    if lost:
+        print(f"not taken over, as the head of {scene.name} lists:", *(f"  {item}" for item in lost), sep="\n")
     print(
         "next:",
         f"  flexclear show {scene}        the start pose with all names, without a run",
@@ -46,27 +51,3 @@ def command(options: argparse.Namespace) -> None:
         f"  flexclear report {scene}      one page with figures, compared with the ideal mechanism",
         sep="\n",
     )
-
-
-def write(kind: str, folder: Path) -> list[Path]:
-    """Write the files of a new mechanism and return their paths, the scene first; InputError where one exists."""
-    sources = sorted(
-        (TEMPLATES / kind.replace("-", "_")).glob("*.toml"), key=lambda p: "[body" not in p.read_text(encoding="utf-8")
-    )
-    targets = [folder / source.name for source in sources]
-    for target in targets:
-        if target.exists():
-            raise InputError(
-                str(target),
-                "already exists and is not overwritten",
-                f"name another folder: flexclear new {kind} FOLDER",
-            )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for source, target in zip(sources, targets, strict=True):
-            target.write_bytes(source.read_bytes())
-    except FileExistsError:
-        raise InputError(str(folder), "is a file, not a folder", "name another folder") from None
-    except OSError as error:
-        raise ResourceError(f"{folder}: cannot be written: {error.strerror}") from None
-    return targets

@@ -5,14 +5,17 @@ The keys of single runs do not depend on this module.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.artifacts.labelled import Labelled
+    from flexclear.dynamics.model.mobility import Mobility
+    from flexclear.dynamics.model.model import Model
     from flexclear.dynamics.record.cost import Cost
+    from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
     from flexclear.system.progress import Progress
 
@@ -52,6 +55,30 @@ def require_without_events(scene: Scene, what: str) -> None:
         raise InputError(f"[event.{name}]", f"{what} needs a scene without events", 'remove them: remove = ["event"]')
 
 
+def start_refusals(scene: Scene, model: Model, mobility: Mobility) -> Iterator[Callable[[], object]]:
+    """Yield checks of the start of a scene's run, which raise its errors, without compilation.
+
+    Velocities, paths and surfaces at the start; then actuators, conditions of events and periods of sections.
+    model: of rigid bodies, at the start of the scene or of its ideal mechanism.
+    """
+    from flexclear.dynamics.run.evaluation.start import consistent_start
+    from flexclear.dynamics.run.evaluation.without_compiler import uncompiled
+
+    engine, states = uncompiled(model, mobility), []
+    yield lambda: states.append(consistent_start(engine))
+    if not states:
+        return
+    from flexclear.dynamics.events.phases import require_false
+    from flexclear.dynamics.record.sections import repeated
+    from flexclear.dynamics.run.inverse import enough
+
+    yield lambda: enough(engine, states[0])
+    if scene.event and (scene.start is None or scene.start.at is None):
+        yield lambda: require_false(scene, engine, states[0])
+    if scene.sections is not None:
+        yield lambda: repeated(engine, states[0])
+
+
 def equilibrium(
     scene: Scene,
     bundles: Mapping[str, Labelled],
@@ -88,3 +115,36 @@ def frequencies(
 
     bench, rest, small = balanced(scene, bundles, progress, time, drives, moving)
     return dataset.linear(bench, rest, small or vibrations(bench, rest.at), moving)
+
+
+def state_space(
+    scene: Scene,
+    bundles: Mapping[str, Labelled],
+    progress: Progress,
+    outputs: Sequence[Quantity],
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    held: bool = False,
+) -> xr.Dataset:
+    """Return the state space about the static equilibrium (schema STATE_SPACE); `equilibrium` has the same arguments.
+
+    outputs: those that the mechanism then has.  held: False where joints' drives become the forces that hold it there.
+    Raises InputError for a controller that samples, SolverError when no equilibrium is found.
+    """
+    from flexclear.dynamics.linear import dataset
+    from flexclear.dynamics.linear.bench import hold, state
+    from flexclear.dynamics.linear.equilibrium import balanced, newton
+    from flexclear.dynamics.linear.state_space import require_continuous, state_space
+    from flexclear.dynamics.starts.snapshot import posed, released
+
+    require_continuous(scene)
+    bench, rest, _ = balanced(scene, bundles, progress, time, drives)
+    moved = {name: drive for name, drive in scene.drive.items() if hasattr(drive, "joint")}
+    if moved and not held:
+        forces = dataset.equilibrium(bench, rest, moving=False)["drive_force"]
+        given = {name: float(forces.sel(drive=name)) for name in moved}
+        still = posed(scene, bench.engine, state(bench, rest.at.q), bench.time)
+        bench, q = hold(released(still, given), bundles, progress, bench.time, {}, moving=False)
+        rest = newton(bench, q)
+    owners = bench.scene.owners()
+    return state_space(bench, rest, [q for q in outputs if q.over_time and q.is_there(owners)])

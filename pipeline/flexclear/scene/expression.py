@@ -11,6 +11,7 @@ import ast
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from flexclear.scene import units
@@ -34,11 +35,25 @@ _TOKEN = re.compile(
 )
 
 
+@dataclass(frozen=True)
+class Lookup:
+    """A table as a function in an expression. name: of the table; of, value: SI units of its columns."""
+
+    name: str
+    of: tuple[str, ...]
+    value: str
+
+
+def operands_of(step: Any) -> int:
+    """Return the number of operands of a step that is no name of an operator: 0 for a leaf."""
+    return len(step.of) if isinstance(step, Lookup) else 0
+
+
 def fold(
     steps: Iterable[Any],
     leaf: Callable[[Any], T],
     apply: Callable[[str, list[T]], T],
-    operands: Callable[[Any], int] = lambda step: OPERANDS[step] if isinstance(step, str) else 0,
+    operands: Callable[[Any], int] = lambda step: OPERANDS[step] if isinstance(step, str) else operands_of(step),
 ) -> T:
     """Evaluate an expression in postfix order: `leaf` for each leaf, `apply` for each operator and its operands.
 
@@ -88,7 +103,13 @@ def _measured(leaf: Any) -> Measure:
     return None if value == 0.0 and unit == "1" else units.measured(unit), "", value
 
 
-def _combined(operator: str, operands: list[Measure]) -> Measure:
+def _combined(operator: Any, operands: list[Measure]) -> Measure:
+    if isinstance(operator, Lookup):
+        for unit, (exponents, dim, _) in zip(operator.of, operands, strict=True):
+            if dim or (exponents is not None and not _same(exponents, units.measured(unit))):
+                given = "a vector" if dim or exponents is None else f"a value in {units.si(exponents)}"
+                raise ValueError(f"table({operator.name}, ...) is over a value in {unit}, not {given}")
+        return units.measured(operator.value), "", None
     (a, first, _), (b, second, number) = operands[0], operands[-1]
     if operator == "minus":
         return a, first, None
@@ -135,11 +156,15 @@ def _same(a: units.Exponents | None, b: units.Exponents | None) -> bool:
 
 
 def postfix(
-    text: str, term: Callable[[str], Any], constants: Mapping[str, tuple[float, str]] | None = None
+    text: str,
+    term: Callable[[str], Any],
+    constants: Mapping[str, tuple[float, str]] | None = None,
+    tables: Mapping[str, Lookup] | None = None,
 ) -> list[Any]:
     """Return an expression in postfix order; raise ValueError for other text.
 
-    term: returns the quantity of a name, or raises ValueError. constants: value and SI unit of each, by name.
+    term: returns the quantity of a name, or raises ValueError. constants: value and SI unit of each, by name. tables:
+    those of loads, by name.
     """
     words, leaves = _as_python(text)
 
@@ -155,6 +180,8 @@ def postfix(
                 own = [*steps(operand), "minus"]
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
                 own = [*steps(left), _exponent(text, steps(right)), "^"]
+            case ast.Call(func=ast.Name(id="table"), args=[ast.Name(id=name), *more], keywords=[]) if name[:1] == "_":
+                own = _lookup(leaves[int(name[1:])][0].strip(), [steps(one) for one in more], tables)
             case ast.Call(func=ast.Name(id=name), args=[first, *more], keywords=[]) if not name.startswith("_"):
                 if bool(more) != (name in SEVERAL):
                     count = "one value" if more else "two values or more"
@@ -189,7 +216,7 @@ def _as_python(text: str) -> tuple[list[str], list[re.Match[str]]]:
         place = token.end()
         if token["operator"]:
             words.append(token["operator"].replace("^", "**"))
-        elif token["name"] in (*FUNCTIONS, *SEVERAL) and text.startswith("(", place):
+        elif token["name"] in (*FUNCTIONS, *SEVERAL, "table") and text.startswith("(", place):
             words.append(token["name"])
         else:
             words.append(f"_{len(leaves)}")
@@ -214,6 +241,17 @@ def _leaf(token: re.Match[str], term: Callable[[str], Any], constants: Mapping[s
     if not quantity.over_time or quantity.dim == "quat":
         raise ValueError(f"'{name}' cannot be part of an expression: it is neither a number nor a vector over time")
     return quantity
+
+
+def _lookup(name: str, values: list[list[Any]], tables: Mapping[str, Lookup] | None) -> list[Any]:
+    if tables is None:
+        raise ValueError("table(...) is for loads by an expression; a law of time reads a file by type = 'table'")
+    if name not in tables:
+        known = ", ".join(tables) or "none"
+        raise ValueError(f"there is no table '{name}' (known: {known}): give tables.{name} its file and columns")
+    if len(values) != len(tables[name].of):
+        raise ValueError(f"table({name}, ...) is over {len(tables[name].of)} quantities, not {len(values)}")
+    return [step for one in values for step in one] + [tables[name]]
 
 
 def _exponent(text: str, steps: list[Any]) -> tuple[float, str]:

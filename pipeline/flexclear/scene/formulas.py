@@ -1,7 +1,8 @@
 """Expressions of loads in the form from which code is generated: structure as text, numbers separately.
 
 The text is the expression in postfix order: ``c0`` is its first number, ``p0.x`` a component of a position that it
-reads, ``q1`` a joint coordinate, ``t`` the time. Expressions that differ only in numbers and names have the same text,
+reads, ``q1`` a joint coordinate, ``t`` the time, ``T0:5:4`` the first table, over two quantities, whose intervals are
+halved 5 and 4 times to find one. Expressions that differ only in numbers and names have the same text,
 and share compiled code.
 """
 
@@ -18,6 +19,7 @@ from flexclear.scene.expression import (
     JUMPING,
     OPERANDS,
     SEVERAL,
+    Lookup,
     check_unit,
     fold,
     measure,
@@ -26,6 +28,8 @@ from flexclear.scene.loads import EXPRESSIONS, JointExpression, LineExpression, 
 from flexclear.scene.owners import turns
 from flexclear.scene.parts import FlexibleBody
 from flexclear.scene.quantity import KINDS, Quantity, read
+from flexclear.scene.tables import LookupTable
+from flexclear.scene.units import measured, si
 
 #: quantities that follow from positions and velocities: letter of their leaves
 READ = {
@@ -62,12 +66,13 @@ class Formula:
     """Expressions of one load.
 
     code: their structure, separated by ``;``. numbers: SI values. reads: kind (``body``, ``frame`` or ``coordinate``)
-    and name of every component that is read.
+    and name of every component that is read. tables: those that are looked up.
     """
 
     code: str
     numbers: tuple[float, ...]
     reads: tuple[tuple[str, str], ...]
+    tables: tuple[LookupTable, ...] = ()
 
     @property
     def bends(self) -> int:
@@ -77,7 +82,7 @@ class Formula:
 
 def operands(token: str) -> int:
     """Return the number of operands of a token of a code; 0 for a leaf."""
-    return 1 if token[0] == "^" and len(token) > 1 else OPERANDS.get(token, 0)
+    return token.count(":") or (1 if token[0] == "^" and len(token) > 1 else OPERANDS.get(token, 0))
 
 
 def formula(scene: Any, name: str) -> Formula | None:
@@ -99,19 +104,26 @@ def formula(scene: Any, name: str) -> Formula | None:
             check_unit(steps, dimension, vector=vector)
         except ValueError as error:
             raise ValueError(f"force = '{text}': {error}") from None
-        codes.append(_encoded(steps, numbers, reads))
-    return Formula(" ; ".join(codes), tuple(numbers), tuple(reads))
+        codes.append(_encoded(steps, numbers, reads, load.tables))
+    return Formula(" ; ".join(codes), tuple(numbers), tuple(reads), tuple(load.tables.values()))
 
 
 def written(scene: Any, load: Any) -> Iterator[tuple[str, list[Any]]]:
     """Yield each expression of a load, and its postfix order; raise ValueError, in words, for one without meaning."""
-    known = constants_of(load.values)
+    known, local = constants_of(load.values), OF_LINES if isinstance(load, LineExpression) else None
     require_used(known, load.texts)
+    require_used(load.tables, load.texts, "tables")
+    tables = {name: _lookup(name, one) for name, one in load.tables.items()}
     for text in load.texts:
         try:
-            yield text, read(text, scene.owners(), known, OF_LINES if isinstance(load, LineExpression) else None)
+            yield text, read(text, scene.owners(), known, local, tables)
         except ValueError as error:
             raise ValueError(f"force = '{text}': {error}") from None
+
+
+def _lookup(name: str, one: LookupTable) -> Lookup:
+    of, value = [si(measured(column.unit)) for column in one.of], si(measured(one.value.unit))
+    return Lookup(name, tuple(of), value)
 
 
 def check_formulas(scene: Any) -> None:
@@ -137,11 +149,11 @@ def constants_of(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
     return known
 
 
-def require_used(known: Iterable[str], texts: Sequence[str]) -> None:
-    """Raise ValueError for a constant that no text uses."""
+def require_used(known: Iterable[str], texts: Sequence[str], family: str = "values") -> None:
+    """Raise ValueError for a constant, or a table, that no text uses."""
     for name in known:
         if not any(re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) for text in texts):
-            raise ValueError(f"values.{name} is not used: remove it, or name it in the expression")
+            raise ValueError(f"{family}.{name} is not used: remove it, or name it in the expression")
 
 
 def _check(scene: Any, step: Any) -> None:
@@ -162,7 +174,9 @@ def _check(scene: Any, step: Any) -> None:
         raise ValueError(f"'{step.name}' belongs to a flexible body: use the frame_position of one of its frames")
 
 
-def _encoded(steps: list[Any], numbers: list[float], reads: list[tuple[str, str]]) -> str:
+def _encoded(
+    steps: list[Any], numbers: list[float], reads: list[tuple[str, str]], tables: Mapping[str, LookupTable]
+) -> str:
     def leaf(step: Any) -> str:
         if isinstance(step, tuple):
             numbers.append(step[0])
@@ -176,7 +190,10 @@ def _encoded(steps: list[Any], numbers: list[float], reads: list[tuple[str, str]
             reads.append((owner, step.owner))
         return f"{letter}{reads.index((owner, step.owner))}" + (f".{step.component}" if step.component else "")
 
-    def apply(operator: str, operands: list[str]) -> str:
+    def apply(operator: Any, operands: list[str]) -> str:
+        if isinstance(operator, Lookup):
+            levels = "".join(f":{one}" for one in tables[operator.name].levels())
+            return " ".join([*operands, f"T{list(tables).index(operator.name)}{levels}"])
         exponent = numbers[-1] if operator == "^" else 0.5
         if exponent == int(exponent) and 0 < abs(exponent) <= WHOLE:
             numbers.pop()

@@ -345,8 +345,15 @@ def law_types(node: object) -> Iterator[str]:
             yield from law_types(item)
 
 
-def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list[tuple[float, float]]:
+def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list[tuple[float, ...]]:
     """Return two columns of a CSV file, time in seconds; raise ValueError, in words, for unreadable files."""
+    unit = time.get("unit", "s")
+    rows = read_columns(path, [time.get("column"), value.get("column")])
+    return [(quantity(f"{t!r} {unit}", "time"), quantity(x, "number")) for t, x in rows]
+
+
+def read_columns(path: Path, requested: list[Any]) -> list[tuple[float, ...]]:
+    """Return columns of a CSV file, by header or number from 1; raise ValueError, in words, for unreadable files."""
     try:
         if not path.is_file() and path.exists():
             raise ValueError(f"the table {path.name} cannot be read: it is not an ordinary file")
@@ -357,15 +364,14 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"the table {path.name} cannot be read: {getattr(error, 'strerror', None) or error}") from None
     header = [] if not rows or _is_number(rows[0][0]) else [cell.strip() for cell in rows[0]]
-    columns = [_column(path, header, rows, part.get("column")) for part in (time, value)]
-    unit = time.get("unit", "s")
+    columns = [_column(path, header, rows, one) for one in requested]
     points = []
     for number, row in enumerate(rows[1:] if header else rows, start=2 if header else 1):
         cells = [row[c].strip() if c < len(row) else "" for c in columns]
         if not all(_is_number(cell) for cell in cells):
             which = " and ".join(str(c + 1) for c in columns)
             raise ValueError(f"row {number} of {path.name} has no numbers in columns {which}")
-        points.append((quantity(f"{float(cells[0])!r} {unit}", "time"), quantity(float(cells[1]), "number")))
+        points.append(tuple(float(cell) for cell in cells))
     return points
 
 

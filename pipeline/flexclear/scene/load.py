@@ -28,7 +28,7 @@ SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accura
 #: largest number of scenes that extend each other in a row; each is read, and the extended ones are copied
 LONGEST_CHAIN = 50
 #: keys of parts that name files, which are searched for next to the scene
-FILES = ("mesh", "file")
+FILES = ("mesh", "file", "from")
 EDITS = ("extends", "replace", "set", "remove")
 #: kinds of TOML files, as messages name them
 SCENE, SWEEP, RECIPE = "a scene", "a sweep of a scene", "a mesh recipe"
@@ -399,15 +399,18 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
             file = shape.get("file") if isinstance(shape, dict) else None
             if isinstance(file, str) and not Path(file).is_absolute():
                 shape["file"] = absolute(file)
+    start = table.get("start")
+    if isinstance(start, dict) and isinstance(start.get("from"), str) and not start.get("recorded"):
+        start["from"] = str(start["from"] if Path(start["from"]).is_absolute() else absolute(start["from"]))
     for law in _tables([table.get(family) for family in ("drive", "load", "event")]):
         if not Path(law["file"]).is_absolute():
             law["file"] = absolute(law["file"])
 
 
 def _tables(node: object) -> Iterator[dict[str, Any]]:
-    """Yield the laws that are read from a file, at any depth."""
+    """Yield the laws and tables that are read from a file, at any depth."""
     if isinstance(node, dict):
-        if node.get("type") == "table" and isinstance(node.get("file"), str) and "points" not in node:
+        if isinstance(node.get("file"), str) and "points" not in node:
             yield node
         node = list(node.values())
     if isinstance(node, list):

@@ -21,6 +21,7 @@ from flexclear.scene.fields import (
     Time,
 )
 from flexclear.scene.laws import Bare, Value
+from flexclear.scene.tables import LookupTable
 from flexclear.scene.units import quantity
 
 Components = tuple[Bare, Bare, Bare]
@@ -179,6 +180,8 @@ class _ByExpression(Part):
 
     values: dict[str, Value] = Field(default_factory=dict)
     """named constants, each a number or text with its unit"""
+    tables: dict[str, LookupTable] = Field(default_factory=dict)
+    """named tables: ``table(damper, rail.velocity)`` is the value of `tables.damper` there"""
 
     @property
     def texts(self) -> tuple[str, ...]:

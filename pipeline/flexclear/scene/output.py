@@ -83,6 +83,8 @@ class Output(Part):
     """flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids"""
     gauges: Annotated[dict[str, Gauge], Field(min_length=1)] | None = None
     """gauges on solids where stress is recorded besides the peak"""
+    frame_loads: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """flexible bodies of which the loads on all frames are recorded, in body axes"""
 
     @model_validator(mode="after")
     def _gauges_are_on_stressed_bodies(self) -> Self:
@@ -101,15 +103,15 @@ class Output(Part):
         return {name: gauge for name, gauge in (self.gauges or {}).items() if gauge.body == body}
 
     def without(self, bodies: Collection[str]) -> dict[str, Any]:
-        """Return the output as a table without the stresses of these bodies."""
-        rest = self.model_dump(mode="json", exclude_none=True, exclude={"stress", "gauges"})
-        stress = [name for name in self.stress or () if name not in bodies]
+        """Return the output as a table without the stresses and loads of these bodies."""
+        rest = self.model_dump(mode="json", exclude_none=True, exclude={"gauges", *VARIABLES})
+        lists = {key: [name for name in asked if name not in bodies] for key, asked in self.requests().items()}
         gauges = {
             name: gauge.model_dump(mode="json", exclude_none=True)
             for name, gauge in (self.gauges or {}).items()
             if gauge.body not in bodies
         }
-        return rest | ({"stress": stress} if stress else {}) | ({"gauges": gauges} if gauges else {})
+        return rest | {key: names for key, names in lists.items() if names} | ({"gauges": gauges} if gauges else {})
 
     def requests(self) -> dict[str, Any]:
         """Return the requests, by key."""
@@ -131,5 +133,13 @@ third_principal_stress? | time gauge | Pa | smallest principal stress at the gau
 stress_position? | time gauge axis | m | undeformed position of that node, body frame
 stress_tensor? | time gauge tensor | Pa | stress at the gauge's node, body axes
 stress_factor? | time stress_field | 1 | factor of the bundle's stress field, SI
+"""),
+    "frame_loads": table("""
+frame_force? | time loaded_frame axis | N | force of joints, loads and contacts on the flexible body at the frame, body
+    axes
+frame_moment? | time loaded_frame axis | N m | their moment about the frame's displaced origin, body axes
+origin_acceleration? | time loaded_body axis | m s-2 | acceleration of the body frame's origin minus gravity, body axes
+axes_velocity? | time loaded_body axis | rad s-1 | angular velocity of the body frame, body axes
+axes_acceleration? | time loaded_body axis | rad s-2 | angular acceleration of the body frame, body axes
 """),
 }

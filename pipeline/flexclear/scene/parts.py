@@ -145,6 +145,13 @@ class RigidBody(Moving):
     the distance of their frames"""
 
 
+class MasslessBody(RigidBody):
+    """A body without mass and inertia, which only carries frames, such as those of two joints in a row."""
+
+    mass: Literal[0]
+    """zero"""
+
+
 def _hertz(value: Any) -> float:
     """Return a frequency [Hz] from a bare number, or text with a unit."""
     number = f"{value} Hz" if isinstance(value, (int, float)) and not isinstance(value, bool) else value
@@ -263,6 +270,13 @@ class MeshedRigidBody(Moving):
         return {**rest, "type": "rigid"}
 
 
+def _all_zero(inertia: Any) -> bool:
+    """Return True for the inertia of nothing: three zeros, or three rows of them."""
+    given = list(inertia) if isinstance(inertia, (list, tuple)) else [inertia]
+    rows = [row if isinstance(row, (list, tuple)) else [row] for row in given]
+    return all(entry in (0, 0.0) for row in rows for entry in row)
+
+
 def _which(body: Any) -> str | None:
     """Return the tag of a body's model: its type, but "meshed" for a body with a recipe and no modes."""
     if isinstance(body, MeshedRigidBody):
@@ -270,6 +284,8 @@ def _which(body: Any) -> str | None:
     if not isinstance(body, dict):
         return getattr(body, "type", None)
     modes = body.get("modes")
+    if body.get("type") == "rigid" and body.get("mass") in (0, 0.0) and _all_zero(body.get("inertia")):
+        return "massless"
     none = isinstance(modes, dict) and modes.get("count") == 0 and not isinstance(modes.get("count"), bool)
     if (body.get("type") == "rigid" and "mesh" in body) or (body.get("type") == "flexible" and none):
         return "meshed"
@@ -280,7 +296,8 @@ Body = Annotated[
     Annotated[Ground, Tag("ground")]
     | Annotated[RigidBody, Tag("rigid")]
     | Annotated[FlexibleBody, Tag("flexible")]
-    | Annotated[MeshedRigidBody, Tag("meshed")],
+    | Annotated[MeshedRigidBody, Tag("meshed")]
+    | Annotated[MasslessBody, Tag("massless")],
     Discriminator(_which),
 ]
 

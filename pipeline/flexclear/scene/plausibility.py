@@ -47,12 +47,13 @@ def _pins(scene: Scene) -> Iterator[InputError]:
     bodies = scene.rigid().values()
     points = [point for body in scene.body.values() for point in _points(body, getattr(body, "pose", None))]
     extents = [_extent([body.com, *(frame.position for frame in body.frames.values())]) for body in bodies]
-    extents += [sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass) for body in bodies]
+    extents += [sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass) for body in bodies if body.mass]
     size = max([*extents, _extent(points)], default=0.0)
     for name, joint in scene.contacts().items():
         for key in ("pin_radius", "ball_radius", "length") if size > 0.0 else ():
             value = getattr(joint, key, None)
-            if value is not None and value > LARGE * size:
+            refused = joint.hollow and key != "length" and value is not None and value >= max(1.0, 15.0 * size)
+            if value is not None and value > LARGE * size and not refused:
                 text = f"{value:g} m is more than the size of the mechanism, {size:.3g} m"
                 yield warning(scene, f"joint.{name}.{key}", text, UNITS)
 
@@ -86,6 +87,8 @@ def _inertias(scene: Scene) -> Iterator[InputError]:
     for name, body in scene.rigid().items():
         own = _extent([body.com, *(frame.position for frame in body.frames.values())])
         extent = own or whole
+        if not body.mass:
+            continue
         gyration = sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass)
         # 1.0: density [kg/m^3], about that of air, above which a body may well be much larger than the extent of its
         # frames, as a disc on a thin shaft
@@ -109,7 +112,7 @@ def _extent(points: list[tuple[float, float, float]]) -> float:
 
 def _masses(scene: Scene) -> Iterator[InputError]:
     """Yield masses that no body with its inertia can have."""
-    bodies = scene.rigid()
+    bodies = {name: body for name, body in scene.rigid().items() if body.mass}
     for name, body in bodies.items():
         others = max((other.mass for key, other in bodies.items() if key != name), default=inf)
         density = least_density(body)

@@ -232,13 +232,16 @@ def read(
     owners: Mapping[str, Collection[str]],
     constants: Mapping[str, tuple[float, str]] | None = None,
     local: Mapping[str, Any] | None = None,
+    tables: Mapping[str, Any] | None = None,
 ) -> list[Any]:
     """Return an expression in postfix order (`scene.expression`); raise ValueError as `parse` does.
 
-    constants: value and SI unit of each. local: meanings of further names.
+    constants: value and SI unit of each. local: meanings of further names. tables: as of `postfix`.
     """
     known = local or {}
-    return postfix(_as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants)
+    return postfix(
+        _as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants, tables
+    )
 
 
 def _as_owned(text: str) -> str:

@@ -57,6 +57,7 @@ wear_direction_outer? | time worn axis | 1 | direction from the socket's centre 
 wear_direction_inner? | time worn axis | 1 | direction from the centre of ball or pin to the contact, its axes
 load_loss? | time | J | energy lost to the loads since the start
 modal_damping_loss? | time | J | energy lost to modal damping since the start
+internal_state? | time internal | 1 | internal state of a controller, a bushing, or bristles of friction, SI units
 contact_offset? | time contact axis | m, rad | ball centre relative to the socket centre, socket axes
 kinetic | time | J | kinetic energy
 potential | time | J | potential energy of the loads

@@ -242,11 +242,11 @@ class Scene(Part):
             except ValueError as error:
                 raise ValueError(f"{where}{name}: {error}") from None
 
-    def _stressed_bodies_are_flexible(self) -> None:
-        for name in self.output.stress or ():
+    def _recorded_bodies_are_flexible(self) -> None:
+        for key, name in ((key, name) for key, names in self.output.requests().items() for name in names):
             if name not in self.flexible():
                 known = ", ".join(self.flexible()) or "none"
-                raise ValueError(f"output.stress: '{name}' is not a flexible body of this scene; known: {known}")
+                raise ValueError(f"output.{key}: '{name}' is not a flexible body of this scene; known: {known}")
 
     @model_validator(mode="before")
     @classmethod
@@ -279,7 +279,7 @@ class Scene(Part):
         self._samples_can_be_made()
         self._quantities_are_there()
         check_formulas(self)
-        self._stressed_bodies_are_flexible()
+        self._recorded_bodies_are_flexible()
         require_possible(self)
 
     def by_need(self) -> bool:

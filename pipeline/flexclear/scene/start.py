@@ -1,11 +1,22 @@
 """The start of a run, where it is given by more than the bodies' poses and velocities."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
-from flexclear.scene.fields import Number, OnCoordinate, Part, PartName, given
+from flexclear.scene.fields import Number, OnCoordinate, Part, PartName, Time, given
+from flexclear.scene.recorded_start import read_row
+from flexclear.scene.units import quantity
 
 #: the keys of one joint coordinate
 KEYS = ("position", "near", "velocity")
@@ -68,10 +79,19 @@ def _several(value: Any) -> Any:
 class Start(Part):
     """The start of the run."""
 
+    model_config = ConfigDict(populate_by_name=True)
+
     at: At | None = None
     """"equilibrium", the static one with drives where their laws start and given joint positions held; or "ideal",
     the start of the mechanism without clearance, each loose pin resting where the joint's force presses it, flexible
     bodies deformed by the loads"""
+    run: str | None = Field(default=None, alias="from")
+    """file of a run, ``run.nc``, that this one continues: bodies, modes, closed contacts, internal states of friction
+    and controllers begin as they are there. Drives and loads follow their laws from `time.start` on"""
+    time: Time | None = None
+    """time in that run; default: its end"""
+    recorded: dict[str, tuple[float, ...]] = Field(default_factory=dict)
+    """the numbers read from that run; not written in a scene"""
     joint: dict[PartName, JointStarts] = Field(default_factory=dict)
     """starts of joints, by name; for joints with several coordinates by the coordinate's name below"""
     modal: dict[PartName, ModalStart] = Field(default_factory=dict)
@@ -84,6 +104,37 @@ class Start(Part):
 
     #: True where an equilibrium is searched for from here, so that free coordinates need no start of their own
     _sought: bool = PrivateAttr(default=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any) -> Any:
+        """Read the run unless its numbers are given; afterwards only its name is stored."""
+        if not isinstance(data, dict) or data.get("recorded") or not isinstance(data.get("from"), str):
+            return data
+        time = data.get("time")
+        found, recorded = read_row(Path(data["from"]), None if time is None else quantity(time, "time"))
+        return {**data, "from": Path(data["from"]).name, "time": found, "recorded": recorded}
+
+    @property
+    def begins(self) -> str | None:
+        """Name of the module that gives the poses of the start, where the scene does not."""
+        return self.at if self.run is None else "recorded"
+
+    @model_serializer(mode="wrap")
+    def _written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Return the keys as a scene writes them."""
+        return {"from" if key == "run" else key: value for key, value in handler(self).items()}
+
+    @model_validator(mode="after")
+    def _one_start(self) -> Self:
+        if self.run is None:
+            if self.time is not None:
+                raise ValueError('time is that of a run in which to begin: give the run, from = "run.nc"')
+            return self
+        other = next((key for key in ("at", "joint", "modal", "branch") if getattr(self, key)), None)
+        if other is not None:
+            raise ValueError(f"from = '{self.run}' determines the whole start: remove start.{other}")
+        return self
 
     @model_validator(mode="after")
     def _no_two_deformations(self) -> Self:

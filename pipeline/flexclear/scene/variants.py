@@ -212,10 +212,10 @@ def _has(name: str, owners: dict[str, dict[str, bool]]) -> bool:
 
 
 def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
-    """Return edits of settings for removed flexible bodies: requested stresses, deformations at the start."""
+    """Return edits of settings for removed flexible bodies: what is recorded of them, deformations at the start."""
     rigid = {effect.owner for effect in gone if effect.kind == FLEXIBILITY}
     settings: dict[str, Any] = {}
-    if scene.output.stress is not None and rigid & set(scene.output.stress):
+    if any(rigid & set(names) for names in scene.output.requests().values()):
         settings["output"] = scene.output.without(rigid)
     if scene.start is not None and rigid & set(scene.start.modal):
         start = scene.start.model_dump(mode="json", exclude_none=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.artifacts.paths import results_root
 from flexclear.dynamics import analyses
+from flexclear.scene.quantity import Quantity
 from flexclear.stages.simulation import bundles, check_run, in_time, rebuild
 
 if TYPE_CHECKING:
@@ -63,3 +64,11 @@ def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
         return {"nc": campbell(scene, reduced, progress, params["speeds"], params["drive"], *where)}
     solve = analyses.frequencies if pose["vibrations"] else analyses.equilibrium
     return {"nc": solve(scene, reduced, progress, *where, pose["moving"])}
+
+
+def state_space(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Return the state space about the equilibrium in a `pose` (schema STATE_SPACE); inputs are ``bundle/<body>``."""
+    pose, scene = params["pose"], rebuild(params, inputs)
+    outputs = [Quantity.read(data) for data in params["outputs"]]
+    where = pose["time"], pose["drives"], pose["held"]
+    return {"nc": analyses.state_space(scene, bundles(inputs), progress, outputs, *where)}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 #: library that writes a format, by ending; empty where it is installed with this program
-NEEDS = {".nc": "", ".csv": "", ".mat": "", ".parquet": "pyarrow", ".xlsx": "openpyxl"}
+NEEDS = {".nc": "", ".csv": "", ".mat": "", ".npz": "", ".parquet": "pyarrow", ".xlsx": "openpyxl"}
 KNOWN = ", ".join(NEEDS)
 
 
@@ -31,7 +31,7 @@ def check_format(target: Path, endings: Sequence[str] = tuple(NEEDS), option: st
 
 
 def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",)) -> None:
-    """Write a dataset: ``.nc`` and ``.mat`` hold everything, tables the variables with the dimensions `rows`."""
+    """Write a dataset: tables hold the variables with the dimensions `rows`, other formats everything."""
     if target.suffix == ".nc":
         write_dataset(target, dataset)
         return
@@ -42,8 +42,18 @@ def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",
         ".parquet": lambda: _written(table(dataset, rows).to_parquet),
         ".xlsx": lambda: _written(table(dataset, rows).to_excel),
         ".mat": lambda: _matlab(dataset),
+        ".npz": lambda: _numpy(dataset),
     }
     publish(target, made[target.suffix]())
+
+
+def _numpy(dataset: xr.Dataset) -> bytes:
+    """Return all variables and coordinates as arrays that ``numpy.load`` reads, text without pickles."""
+    from numpy import savez
+
+    arrays = {str(name): array.values for name, array in dataset.variables.items()}
+    plain = {name: values.astype(str) if values.dtype.kind in "UO" else values for name, values in arrays.items()}
+    return _written(lambda file: savez(file, allow_pickle=False, **plain))
 
 
 def _matlab(dataset: xr.Dataset) -> bytes:

@@ -218,6 +218,17 @@ class Graph:
             stage, params = "campbell", {**params, "speeds": list(map(float, speeds)), "drive": drive}
         return self._simulation(stage, {**params, "pose": pose}, function="linear")
 
+    def state_space(
+        self, time: float | None = None, drives: Mapping[str, float] | None = None, *, held: bool = False
+    ) -> Task:
+        """Return the task of the state space about the equilibrium in one pose; shown as ``state_space.nc``."""
+        params = {
+            **simulation.params(self.scene, without=("output",)),
+            "outputs": [quantity.written() for quantity in self.scene.watched()],
+            "pose": {"time": time, "drives": dict(drives or {}), "held": held},
+        }
+        return self._simulation("state_space", params)
+
     def up_to(self, stage: str) -> list[Task]:
         """Return all tasks of the scene up to and including a stage."""
         requested = STAGES[: STAGES.index(stage) + 1]

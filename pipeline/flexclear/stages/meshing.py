@@ -14,6 +14,7 @@ from flexclear.scene.toml_files import read_toml
 from flexclear.structure.kinds import name_of
 from flexclear.system.errors import InputError
 from flexclear.system.external_files import companions
+from flexclear.workflow.fingerprint import library_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +45,10 @@ def params(
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     sources(recipe)
-    return {"recipe": provenance.without(table | changes)} | ({"segment": list(segment)} if segment else {})
+    more: dict[str, Any] = {"segment": list(segment)} if segment else {}
+    if isinstance(table.get("shape"), dict) and table["shape"].get("type") == "step":
+        more["gmsh"] = library_version("gmsh")
+    return {"recipe": provenance.without(table | changes)} | more
 
 
 def sources(recipe: Path, where: str = "") -> dict[str, str]:

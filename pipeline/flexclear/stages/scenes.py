@@ -187,17 +187,19 @@ def deficits(graph: Graph, workplace: Workplace) -> str:
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
-def linear(scene: Scene, time: float | None = None, workplace: Workplace | None = None, **pose: Any) -> xr.Dataset:
+def linear(
+    scene: Scene, time: float | None = None, workplace: Workplace | None = None, task: str = "linear", **pose: Any
+) -> xr.Dataset:
     """Return the equilibrium of a scene in one pose, and its natural vibrations; brought up to date as `run` is.
 
-    pose: as of `Graph.linear`.
+    task, pose: `Graph.linear` or `Graph.state_space`, and its arguments.
     """
     if time is not None and not scene.time.start <= time <= scene.time.end:
         raise InputError(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
-    task = Graph(scene, shown=as_in_its_file(scene)).linear(time, **pose)
-    return (workplace or open_workplace()).datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
+    made = getattr(Graph(scene, shown=as_in_its_file(scene)), task)(time, **pose)
+    return (workplace or open_workplace()).datasets(made)[0].assign_attrs(title=scene.title, scene=scene.name)
 
 
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flexclear.dynamics.loads.lookup import length
 from flexclear.scene.expression import BENT, fold
 from flexclear.scene.formulas import VECTORS, operands
 
@@ -17,13 +18,26 @@ UNINDEXED = {"t": "looks.law(d, k, 0)", "l": "looks.line(d, k)[0]", "s": "looks.
 class Lines:
     """Lines of a kernel, each of which assigns a value to a name; equal values have one name."""
 
-    def __init__(self) -> None:
+    def __init__(self, code: str) -> None:
         self.lines: dict[str, str] = {}
-        self.bends = 0
+        self.bends, tokens = 0, code.split()
+        # the numbers of the tables follow the origin and the expressions' own
+        self.first, end = (
+            dict[str, int](),
+            3 + len({token for token in tokens if token[0] == "c" and token[1:].isdigit()}),
+        )
+        for token in sorted({one for one in tokens if ":" in one}, key=lambda one: int(one[1:].partition(":")[0])):
+            self.first[token] = end
+            end += length(_levels(token))
 
     def name(self, text: str) -> str:
         """Return the name of a value."""
         return self.lines.setdefault(text, f"x{len(self.lines)}")
+
+    def function(self, name: str, result: str) -> str:
+        """Return the source of the function name(d, k) with these lines."""
+        body = "".join(f"    {name} = {text}\n" for text, name in self.lines.items())
+        return f"def {name}(d, k):\n{body}    return {result}\n"
 
     def leaf(self, token: str) -> tuple[str, bool]:
         """Return the name of a leaf's value, and True for a vector."""
@@ -36,6 +50,10 @@ class Lines:
     def apply(self, token: str, values: list[tuple[str, bool]]) -> tuple[str, bool]:
         """Return the name of an operation's result, and True for a vector."""
         names, vectors = [name for name, _ in values], [vector for _, vector in values]
+        if token in self.first:
+            levels = _levels(token)
+            given = ", ".join(map(str, [self.first[token], *levels, *names]))
+            return self.name(f"looks.{'curve' if len(levels) == 1 else 'surface'}(d, k, {given})"), False
         if token == "norm":
             return self.name(
                 f"looks.np.sqrt(looks.dot({names[0]}, {names[0]}))" if vectors[0] else f"abs({names[0]})"
@@ -53,6 +71,10 @@ class Lines:
         return self.name(FORMS[token].format(*names)), False
 
 
+def _levels(token: str) -> tuple[int, ...]:
+    return tuple(map(int, token.split(":")[1:]))
+
+
 def _vector(token: str, names: list[str], vectors: list[bool]) -> str:
     first, last = names[0], names[-1]
     if token in "+-":
@@ -64,8 +86,22 @@ def _vector(token: str, names: list[str], vectors: list[bool]) -> str:
 
 def source(name: str, code: str) -> str:
     """Return the source of the kernel name(d, k): the number, or the vector of three, that load k computes."""
-    lines = Lines()
+    lines = Lines(code)
     values = [fold(part.split(), lines.leaf, lines.apply, operands)[0] for part in code.split(" ; ")]
     result = values[0] if len(values) == 1 else f"({', '.join(values)})"
-    body = "".join(f"    {name} = {text}\n" for text, name in lines.lines.items())
-    return f"@kernel\ndef {name}(d, k):\n{body}    return {result}\n"
+    return f"@kernel\n{lines.function(name, result)}"
+
+
+def looked_up(code: str) -> str:
+    """Return the source of the function looked_up(d, k): number of a table, and the values at which load k looks it up,
+    for each place in its expressions."""
+    lines, found = Lines(code), list[str]()
+
+    def apply(token: str, values: list[tuple[str, bool]]) -> tuple[str, bool]:
+        if token in lines.first:
+            found.append(f"({token[1:].partition(':')[0]}, ({', '.join(name for name, _ in values)},))")
+        return lines.apply(token, values)
+
+    for part in code.split(" ; "):
+        fold(part.split(), lines.leaf, apply, operands)
+    return lines.function("looked_up", f"[{', '.join(found)}]")

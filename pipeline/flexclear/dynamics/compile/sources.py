@@ -11,7 +11,7 @@ right-hand side) and "observe" (recorded quantities).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -136,12 +136,9 @@ class Composition:
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     """Return the sources by function name, without the right-hand side, in an order where callees come first."""
-    laws = Composition(parts, "laws of time", "laws", (PRESCRIBED, "make_laws"))
-    if parts.harmonics:
-        laws.given["harmonics"] = laws.harmonics
-    by_name = {"prescribe": laws.calling("prescribe", "t")}
+    by_name = {"prescribe": _laws(parts).calling("prescribe", "t")}
     if parts.closures:
-        by_name["project"] = _project(parts)
+        by_name["project"] = _projection(parts).text(PROJECT)
     if integrators.INTEGRATORS[scheme.integrator].retracts:
         maker = (f"{DYNAMICS}.equations.retraction", "make_retraction")
         retraction = _joints(parts, "retraction of", "retraction", maker)
@@ -150,17 +147,30 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     if "events" in events.given:
         events.take(f"{DYNAMICS}.fields", "data")
         by_name["resolve"] = events.text(RESOLVE)
-    return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
+    return by_name | {"observe": _observation(parts).text(OBSERVE), "advance": _advance(parts, scheme)}
 
 
 def kernels(parts: Parts) -> dict[str, str]:
     """Return the sources of generic right-hand side and recorded quantities, for a topology without own code."""
+    formulas = _formulas(parts)
+    described = _description(parts).calling("describe", formulas=formulas)
+    return {"evaluate": _right_hand_side(parts).calling("evaluate", "t, y, dy", formulas), "describe": described}
+
+
+def _laws(parts: Parts) -> Composition:
+    """Return a file for the laws of time."""
+    file = Composition(parts, "laws of time", "laws", (PRESCRIBED, "make_laws"))
+    if parts.harmonics:
+        file.given["harmonics"] = file.harmonics
+    return file
+
+
+def _right_hand_side(parts: Parts) -> Composition:
+    """Return a file for the generic right-hand side, with the laws of time."""
     file = _equations(parts)
     file.kernel, file.maker = "right_hand_side", (RIGHT_HAND_SIDE, "make_right_hand_side")
     file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({file.harmonics})"
-    formulas = _formulas(parts)
-    described = _description(parts).calling("describe", formulas=formulas)
-    return {"evaluate": file.calling("evaluate", "t, y, dy", formulas), "describe": described}
+    return file
 
 
 def specialised(
@@ -230,6 +240,18 @@ def rates(parts: Parts) -> str:
     return _equations(parts, whole=False).text("", _formulas(parts))
 
 
+def for_python(parts: Parts) -> Iterator[tuple[str, str, str]]:
+    """Yield name, kernel and source of all with which Python evaluates and observes a state, without compilation.
+
+    They call those before them as the names of `calls`.
+    """
+    formulas = _formulas(parts)
+    files = {"laws": _laws(parts), "evaluate": _right_hand_side(parts), "describe": _description(parts)}
+    files |= {"project": _projection(parts)} if parts.closures else {}
+    for name, file in (files | {"observe": _observation(parts)}).items():
+        yield name, file.kernel, file.text("", formulas if name in ("evaluate", "describe") else "")
+
+
 def _equations(parts: Parts, *, whole: bool = True) -> Composition:
     """Return a file for the right-hand side; whole: with friction of ideal joints."""
     file = _forces(parts, "right-hand side of", "rates", (RIGHT_HAND_SIDE, "make_rates"))
@@ -241,7 +263,8 @@ def _equations(parts: Parts, *, whole: bool = True) -> Composition:
     return file
 
 
-def _project(parts: Parts) -> str:
+def _projection(parts: Parts) -> Composition:
+    """Return a file for the projection onto the closures."""
     projection = f"{DYNAMICS}.equations.projection"
     file = _joints(parts, "projection with", "projection", (projection, "make_projection"))
     file.given["evaluate"] = "calls.evaluate"
@@ -250,7 +273,7 @@ def _project(parts: Parts) -> str:
         stiffen = file.take(projection, "make_stiffen")
         file.given["stiffen"] = f"{stiffen}({file.given['closures']}, {file.tree}, {file.flexible})"
         file.given["to_modes"] = file.take(f"{DYNAMICS}.bodies.interface", "to_modes")
-    return file.text(PROJECT)
+    return file
 
 
 def _description(parts: Parts) -> Composition:
@@ -263,11 +286,12 @@ def _description(parts: Parts) -> Composition:
     return file
 
 
-def _observe(parts: Parts) -> str:
+def _observation(parts: Parts) -> Composition:
+    """Return a file for the record of states."""
     file = Composition(parts, "record", "observation", (f"{DYNAMICS}.equations.observation", "make_observation"))
     file.given = {"evaluate": "calls.evaluate", "laws": "calls.laws", "describe": "calls.describe"}
     file.given["project"] = file.projection
-    return file.text(OBSERVE)
+    return file
 
 
 def _advance(parts: Parts, scheme: Scheme) -> str:

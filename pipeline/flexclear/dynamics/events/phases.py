@@ -26,9 +26,9 @@ from flexclear.dynamics.run.run import Run, follow, maker, observed, require_sha
 from flexclear.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never
 from flexclear.dynamics.starts.snapshot import moving
 from flexclear.scene.events import Event
-from flexclear.scene.quantity import condition
+from flexclear.scene.quantity import Quantity, condition
 from flexclear.scene.schema import Scene
-from flexclear.system.errors import InputError, SolverError, StoppedError
+from flexclear.system.errors import InputError, SolverError, StoppedError, refuse
 from flexclear.system.progress import Progress
 
 #: evaluations between checks of the conditions; where a run fails after an event, the smaller number
@@ -76,6 +76,26 @@ def simulated(
     return joined(scene, phases, notes)
 
 
+def require_false(scene: Scene, engine: Engine, y: np.ndarray) -> None:
+    """Raise InputErrors for events whose conditions are true in the state y at the start of the run."""
+    _refuse_true(Watch(engine, y, _conditions(scene, _due(scene.event)), {}), scene.event)
+
+
+def _due(waiting: Mapping[str, Event]) -> dict[str, Event]:
+    """Return the events that wait for no other one."""
+    return {name: event for name, event in waiting.items() if not event.before & waiting.keys()}
+
+
+def _conditions(scene: Scene, due: Mapping[str, Event]) -> dict[str, Quantity]:
+    owners = scene.owners()
+    return {name: condition(str(e.at), owners) for name, e in due.items() if not isinstance(e.at, float)}
+
+
+def _refuse_true(watch: Watch, events: Mapping[str, Event]) -> None:
+    problem, remedy = "is already true at the start of the run", "reverse the comparison, or correct the event's change"
+    refuse([InputError(f"[event.{name}.at]", f"'{events[name].at}' {problem}", remedy) for name in watch.held])
+
+
 @contextmanager
 def _in_words(phases: list[Phase]) -> Iterator[None]:
     """Name the last event in errors of the scene that it has left."""
@@ -103,7 +123,7 @@ class _Plan:
     ) -> tuple[Phase, str | None, tuple[Scene, Engine, np.ndarray] | None]:
         """Return a phase, the event that ends it, and scene, engine and state there; both None in the last phase."""
         t, end = start.scene.time.start, self.scene.time.end
-        due = {n: e for n, e in waiting.items() if not e.before & waiting.keys()}
+        due = _due(waiting)
         timed = {n: max(e.at, t) for n, e in due.items() if isinstance(e.at, float)}
         first = min(timed, key=timed.__getitem__, default=None)
         until = end if first is None else timed[first]
@@ -117,18 +137,12 @@ class _Plan:
         known = before[-1].coordinates if before else {}
         if start.before is not None:
             y = carry(start.before[0].model, start.before[1], engine.model, y, known)
-        owners = self.scene.owners()
-        conditions = {n: condition(str(e.at), owners) for n, e in due.items() if not isinstance(e.at, float)}
+        conditions = _conditions(self.scene, due)
         watch = Watch(engine, y, conditions, known)
         begins = _energies(engine, y, t)
         phase = Phase(None, t, begins, begins, watch.coordinates)
-        if watch.held and start.before is None:
-            name = watch.held[0]
-            raise InputError(
-                f"[event.{name}.at]",
-                f"'{waiting[name].at}' is already true at the start of the run",
-                "reverse the comparison, or correct the event's change",
-            )
+        if start.before is None:
+            _refuse_true(watch, waiting)
         at_once = watch.held[0] if watch.held else first if until <= t else None
         if at_once is not None:
             return phase, at_once, (scene, engine, y)

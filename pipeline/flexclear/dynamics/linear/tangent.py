@@ -152,18 +152,30 @@ def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multiplie
     equations are singular.
     """
     engine, model, count = bench.engine, bench.model, len(directions)
+    w = changed(bench, q, directions)
+    o = engine.h[m.JACOBIAN]
+    rows = selection.dense(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
+    forces = dual.changes(bias(engine, w), count)
+    return (forces - multipliers @ rows) @ modes_of(model.arrays).T
+
+
+def changed(bench: Bench, q: np.ndarray, directions: np.ndarray, laws: np.ndarray | None = None) -> np.ndarray:
+    """Return the work space with its changes after an evaluation at rest in positions q.
+
+    directions: changes of the state, (directions, NY).  laws: of the entries of the table LAW, (directions, entries).
+    """
+    engine, model = bench.engine, bench.model
     y = state(bench, q)
     # stores the laws of time, and all work arrays, in the work space
     closure_rows.evaluate(engine, y, bench.time)
     h, w = engine.h.tolist(), list(engine.w)
     w[h[m.Y] : h[m.Y] + len(y)] = dual.seeded(y, directions)
+    if laws is not None:
+        first = h[m.LAW.at]
+        w[first : first + laws.shape[1]] = dual.seeded(engine.w[first : first + laws.shape[1]], laws)
     with np.errstate(all="ignore"):  # as in compiled code, unused values may be infinite
         _rates(model.parts)(h, list(model.arrays.f), w, engine.n.tolist(), h[m.Y], h[m.SLOPES])
-
-    o = h[m.JACOBIAN]
-    rows = selection.dense(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
-    forces = dual.changes(bias(engine, np.array(w, dtype=object)), count)
-    return (forces - multipliers @ rows) @ modes_of(model.arrays).T
+    return np.array(w, dtype=object)
 
 
 @cache

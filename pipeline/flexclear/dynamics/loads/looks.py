@@ -7,6 +7,7 @@ import numpy as np  # noqa: F401
 from flexclear.dynamics import gauge
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.loads.fields import law, line, number  # noqa: F401
+from flexclear.dynamics.loads.lookup import curve, surface  # noqa: F401
 from flexclear.dynamics.vectors import add, dot, scale, sub  # noqa: F401
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from flexclear.dynamics.loads import lookup
 from flexclear.scene.formulas import Formula
 from flexclear.scene.laws import Polynomial
 from flexclear.scene.units import quantity_at
@@ -49,4 +50,5 @@ def numbers(load: Any, path: str, **dimensions: str) -> list[float]:
 def by_formula(formula: Formula, path: str, **acts: Any) -> Row:
     """Return the row of a load by an expression.  acts: the frames or joint that the load acts on."""
     bends, laws = ((0.0,),) * formula.bends, ((TIME, "time", path),)
-    return Row(laws=laws, numbers=formula.numbers, bends=bends, reads=formula.reads, located=True, **acts)
+    looked_up = tuple(number for table in formula.tables for number in lookup.numbers(table))
+    return Row(laws=laws, numbers=formula.numbers + looked_up, bends=bends, reads=formula.reads, located=True, **acts)

@@ -140,7 +140,8 @@ def _mobilities(mechanism: Mechanism, poses: Sequence[Placement], still: Collect
             result += [0.0] * 6
             continue
         moment = float(np.linalg.eigvalsh(link.undeformed.moments)[0])
-        result += [largest / max(moment / L**2, link.mass * LEAST_GYRATION**2)] * 3 + [largest / link.mass] * 3
+        mass = max(link.mass, LEAST_GYRATION**2 * largest)  # a link without mass moves easily
+        result += [largest / max(moment / L**2, mass * LEAST_GYRATION**2)] * 3 + [largest / mass] * 3
     return np.array(result)
 
 

@@ -105,6 +105,14 @@ def bristle(name: str, joint: Any) -> float | None:
 def resolve_one(mechanism: Mechanism, contact: Contact) -> Resolved:
     """Return the normal law of a contact; raise InputError for impossible values."""
     ends = () if isinstance(contact.joint, End) else (contact.outer, contact.inner)
+    radius, size = contact.joint.radius, mechanism.length
+    # no mechanism has a tenth of the size of its pin of a metre: the unit is missing
+    if not isinstance(contact.joint, End) and contact.joint.hollow and radius >= max(1.0, 10.0 * size):
+        raise InputError(
+            f"[{contact.place}.{contact.joint.surfaces[1]}_radius]",
+            f"{radius:g} m is more than ten times the size of the mechanism",
+            f'bare numbers are in metres; write "{radius:g} mm" for millimetres',
+        )
     mass = _reduced_mass([mechanism.links[site.link].mass for site in ends])
     return resolved(contact.joint, mass, f"[{contact.place}.normal]")
 

@@ -393,7 +393,7 @@ def _size(links: Sequence[Link], frames: Mapping[str, Frame], clearances: Sequen
 
 
 def _inertias(links: Sequence[Link]) -> list[tuple[float, np.ndarray, np.ndarray]]:
-    return [link.inertia for link in links if link.inertia is not None]
+    return [link.inertia for link in links if link.inertia is not None and link.inertia.mass > 0.0]
 
 
 def require_bodies(scene: Scene) -> None:

@@ -171,7 +171,7 @@ def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia
         parts.append((body.mass, c, here.R @ np.array(body.inertia) @ here.R.T))
         mass += body.mass
         first = first + body.mass * c
-    com = first / mass
+    com = first / mass if mass > 0.0 else parts[0][1]
     inertia = np.zeros((3, 3))
     for m, c, J in parts:
         d = c - com

@@ -15,10 +15,11 @@ from flexclear.artifacts.schema import RUN, conformed
 from flexclear.dynamics.effects.citations import references
 from flexclear.dynamics.equations.observation import Observed, Series, Variables
 from flexclear.dynamics.model.driving import prescribed
+from flexclear.dynamics.model.internal_states import named_states
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import doubts
 from flexclear.dynamics.model.stops import ends_an_angle
-from flexclear.dynamics.record import bushings, controllers, gears, joint_friction, stress, wear
+from flexclear.dynamics.record import bushings, controllers, frame_loads, gears, joint_friction, stress, wear
 from flexclear.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.dynamics.record.topology import topology
 from flexclear.dynamics.record.wrenches import every_joint_wrench, held_moments
@@ -39,7 +40,7 @@ def recorded(run: Run) -> LabelledArrays:
     motions = Motions(model, run.observed)
     frames, joints = list(model.mechanism.frames), list(model.scene.joint)
     parts = list(_motion(motions, motions.moving_bodies, joints, frames))
-    parts += [_names(model), *(made() for _, made in _makers(run.scene, motions))]
+    parts += [_names(model), _internal(model, trajectory), *(made() for _, made in _makers(run.scene, motions))]
     if model.contacts:
         parts.append((events_of(model, trajectory), {}))
     if run.perturbed is not None:
@@ -92,7 +93,7 @@ RECORDS = {
 #: of effects: warnings about the results of a run
 WARNINGS = {"joint_friction": joint_friction.warnings}
 #: variables that a scene's ``[output]`` requests, by its key
-ON_REQUEST = {"stress": stress.record}
+ON_REQUEST = {"stress": stress.record, "frame_loads": frame_loads.record}
 #: beginnings of the names of the ledger's variables
 _LEDGER = (
     *("kinetic", "potential", "elastic", "dissipated", "drive_work", "energy_error", "constraint_error", "load_work"),
@@ -190,6 +191,8 @@ def _tilts(run: Run) -> Iterator[str]:
     from flexclear.dynamics.contact import validity
 
     model, time = run.model, run.trajectory.time
+    if not np.ptp(time) > 0.0:  # an equilibrium has no mean
+        return
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
     for c, held in held_moments(Motions(model, run.observed)).items():
         contact, impulse = model.contacts[c], ledger.series(model, run.observed)["contact_impulse"][1][:, c]
@@ -271,6 +274,13 @@ def _names(model: Model) -> Series:
     return {}, coordinates
 
 
+def _internal(model: Model, trajectory: Trajectory) -> Series:
+    """Return the internal states from which another run may continue."""
+    if not (named := named_states(model)):
+        return {}, {}
+    return {"internal_state": (("time", "internal"), trajectory.state[:, [*named.values()]])}, {"internal": [*named]}
+
+
 def _modes(motions: Motions) -> Series:
     model = motions.model
     if not model.numbering.flexible:
@@ -317,6 +327,11 @@ def _joint_coordinates(model: Model, seen: Observed) -> Series:
     series = (np.stack(values, axis=1) for values in zip(*every.values(), strict=True))
     variables: Variables = {name: (("time", "coordinate"), s) for name, s in zip(names, series, strict=True)}
     kinds = {label: (joint, turns) for label, joint, turns in named_coordinates(model.scene)}
+    known = model.scene.start.recorded if model.scene.start is not None else {}
+    for name, angle in zip(every, variables["joint_position"][1].T, strict=True):
+        if kinds[name][1]:  # full turns go on from those of the run that this one continues
+            before = known.get(f"joint.{name}", angle[:1])[0]
+            angle += 2.0 * np.pi * np.round((before - angle[0]) / (2.0 * np.pi))
     return variables, {
         "coordinate": list(every),
         "coordinate_joint": ("coordinate", [kinds[name][0] for name in every]),

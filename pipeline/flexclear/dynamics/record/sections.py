@@ -52,20 +52,12 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     Raises InputError for laws that do not repeat, SolverError when the run cannot continue.
     """
     requested = scene.sections or Sections()
-    for name, load in scene.load.items():
-        if isinstance(load, SampledPid):
-            raise InputError(
-                f"[load.{name}]",
-                "a sampled controller counts its periods from the start of the run, which sections repeat",
-                "use a continuous 'pid' here",
-            )
     period = section_period(scene)
     # only the states at waypoints are requested
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
     names = recorded_bodies(engine.model, requested.bodies, "[sections.bodies]")
     start = consistent_start(engine)
-    parts = stretches(engine, period, requested.phase)
-    require_periodic(parts, start)
+    parts = repeated(engine, start)
     count = requested.transient + requested.periods
     followed = range(requested.transient, min(count, requested.transient + requested.exponent_periods))
     tape, begin = _Tape(names, engine.start + requested.phase), Cursor()
@@ -97,6 +89,21 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     return conform(
         made, SECTIONS, title=title, **attributes(scene), **facts, neighbour_distance=NEIGHBOUR * engine.rtol
     )
+
+
+def repeated(engine: Engine, start: np.ndarray) -> list[Engine]:
+    """Return the engine for each stretch of a period; raise InputError for a scene whose laws do not repeat."""
+    scene = engine.model.scene
+    for name, load in scene.load.items():
+        if isinstance(load, SampledPid):
+            raise InputError(
+                f"[load.{name}]",
+                "a sampled controller counts its periods from the start of the run, which sections repeat",
+                "use a continuous 'pid' here",
+            )
+    parts = stretches(engine, section_period(scene), (scene.sections or Sections()).phase)
+    require_periodic(parts, start)
+    return parts
 
 
 @dataclass

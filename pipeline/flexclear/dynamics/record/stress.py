@@ -270,14 +270,20 @@ def factors(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndar
 
     moment, force: as `motion_and_loads` returns them.
     """
-    origins = bundle["frame_position"].values + np.einsum(
-        "fim,tm->tfi", bundle["frame_translation_shape"].values, motion.q, optimize=True
-    )
-    loads = np.concatenate([force, moment - np.cross(origins, force)], axis=2)
+    loads = on_displaced_frames(bundle, motion, moment, force)
     W = skew(motion.omega)
     slope = skew(motion.alpha) + W @ W  # acceleration per position in the body
     rows = len(motion.a)
     return np.hstack([motion.q, loads.reshape(rows, -1), motion.a, slope.reshape(rows, 9), motion.du])
+
+
+def on_displaced_frames(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return forces, and moments about the frames' displaced origins, body axes, shape (time, frame, 6).
+
+    moment, force: as `motion_and_loads` returns them.
+    """
+    origins = bundle["frame_position"].values + _moved(bundle, "frame_translation_shape", motion.q)
+    return np.concatenate([force, moment - np.cross(origins, force)], axis=2)
 
 
 def gauge_nodes(bundle: Labelled) -> dict[str, np.ndarray]:

@@ -33,6 +33,7 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     model, gauges, numbers = engine.model, *(engine.model.arrays.table(one) for one in (m.GAUGES, m.LOAD_NUMBERS))
     periods = {name: load.period for name, load in model.scene.load.items() if isinstance(load, SampledPid)}
     sampled = model.rows_of(SampledPid)
+    continues = model.scene.start is not None and bool(model.scene.start.recorded)
 
     def sample(y: np.ndarray, t: float) -> np.ndarray:
         due = [row for name, row in sampled.items() if _is_due(periods[name], t - engine.start)]
@@ -46,7 +47,7 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
         for row in due:
             error = float(laws[row["law0"]]) - values(gauges[[row["measured"]]], sites, internal)[0]
             gains, states = numbers["value"][row["number0"] :][:7], internal[int(row["internal0"]) :][:3]
-            states[:] = sample_error(gains, states, error, first=t == engine.start)
+            states[:] = sample_error(gains, states, error, first=t == engine.start and not continues)
         return y
 
     return sample

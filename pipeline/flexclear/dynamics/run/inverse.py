@@ -53,12 +53,9 @@ def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
     Raises InputError when the actuators cannot produce the motion, or could in more than one way.
     """
-    requested = {n: d for n, d in scene.drive.items() if isinstance(d, PathDrive) and d.actuators is not None}
-    names = [a for path in requested.values() for a in path.actuators or ()]
-    _with_drives(scene, requested, names)  # all of them can be named, before anything is compiled
+    requested, names = _actuators(scene)  # all of them can be named, before anything is compiled
     engine, start = _started(scene, bundles, progress)
-    closure_rows.evaluate(engine, start, engine.start)
-    alone = _enough(engine, scene, requested, names)
+    alone = enough(engine, start)
     trajectory, *sides = _run(engine, start, progress)
     before, after = (joint_coordinates(engine.model, seen) for seen in sides)
     laws = {}
@@ -68,6 +65,14 @@ def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         laws[name] = hermite(trajectory.time, np.array(before[series]), np.array(after[series]))
     other = _with_drives(scene, requested, alone)
     return (other, laws) if len(alone) == len(names) else _shared(other, laws, names, bundles, progress)
+
+
+def _actuators(scene: Scene) -> tuple[dict[str, PathDrive], list[str]]:
+    """Return the paths that actuators produce, and the actuators; raise InputError for one that cannot be named."""
+    requested = {n: d for n, d in scene.drive.items() if isinstance(d, PathDrive) and d.actuators is not None}
+    names = [a for path in requested.values() for a in path.actuators or ()]
+    _with_drives(scene, requested, names)
+    return requested, names
 
 
 def _started(
@@ -122,9 +127,16 @@ def _named(actuator: str) -> str | None:
     return actuator.partition(".")[2] or None
 
 
-def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], names: list[str]) -> list[str]:
-    """Select as many actuators as there are freedoms: all of them, unless the scene allows redundant ones."""
-    nv, drives = engine.model.nv, engine.model.drives
+def enough(engine: Engine, start: np.ndarray) -> list[str]:
+    """Select as many actuators as there are freedoms at the start: all, unless the scene allows redundant ones.
+
+    Raises InputError when the actuators cannot produce the motion, or could in more than one way.
+    """
+    scene, nv, drives = engine.model.scene, engine.model.nv, engine.model.drives
+    requested, names = _actuators(scene)
+    if not names:
+        return []
+    closure_rows.evaluate(engine, start, engine.start)
     free = null_space(_closure_jacobian(engine), rcond=RANK_TOLERANCE)
     known = [k for k, name in enumerate(drives) if name.partition(".")[0] in requested]
     held = [k for k in range(len(drives)) if k not in known]

@@ -120,12 +120,14 @@ class Handover:
 
 
 def memory(engine: Engine) -> dict[str, np.ndarray]:
-    """Return copies of an engine's arrays."""
-    return {name: getattr(engine, name).copy() for name in MEMORY}
+    """Return copies of an engine's arrays, without the addresses of functions, which belong to this process."""
+    arrays = {name: getattr(engine, name).copy() for name in MEMORY}
+    arrays["h"][list(m.ADDRESSES)] = 0
+    return arrays
 
 
 def remember(engine: Engine, arrays: Mapping[str, np.ndarray]) -> None:
-    """Restore the arrays from `memory`, except the addresses of functions, which belong to this process."""
+    """Restore the arrays from `memory`."""
     addresses = engine.h[list(m.ADDRESSES)].copy()
     for name in MEMORY:
         getattr(engine, name)[:] = arrays[name]

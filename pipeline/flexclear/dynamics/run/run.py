@@ -81,11 +81,11 @@ def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
 
 def placed(scene: Scene) -> Scene:
     """Return the scene with bodies positioned by joints and drives at the begin of the run, if it begins elsewhere."""
-    if scene.start is None or scene.start.at is None:
+    if scene.start is None or scene.start.begins is None:
         return scene
     from flexclear.dynamics.starts import STARTS  # here, since runs start with runs
 
-    return STARTS[scene.start.at].placed(scene)
+    return STARTS[scene.start.begins].placed(scene)
 
 
 def driven(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
@@ -102,11 +102,11 @@ def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
     Return also which of several assemblies was chosen, in words; empty when there is one, or the scene chooses.
     """
-    if scene.start is None or scene.start.at is None:
+    if scene.start is None or scene.start.begins is None:
         return scene, ""
     from flexclear.dynamics.starts import STARTS
 
-    return STARTS[scene.start.at].begin(scene, bundles, progress)
+    return STARTS[scene.start.begins].begin(scene, bundles, progress)
 
 
 def engines(

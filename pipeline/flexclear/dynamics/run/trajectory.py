@@ -140,23 +140,38 @@ def integrate(
         outputs = engine.output_times(engine.model.scene.output.interval)
     stopping.check()  # many short integrations never pause
     with stopping.heeded():
-        engine.specialised.rows.clear()
-        tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
-        engine.settle(progress)
-        tape.looks.append(look(engine))
-        sample, control = _sampler(engine), engine.control
-        for a, b in pairwise(engine.breaks):
-            if b <= control[m.TIME]:
-                continue
-            if a > begun:
-                engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-                if jumps is not None:
-                    jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
-            engine.select_pieces_after(0.5 * (a + b))
-            control[m.END], engine.n[m.FRESH] = b, 1
-            if _segment(engine, tape, progress, stop, judge, jumps):
-                break
+        tape = begin(engine, y, outputs, progress) if left is None else resume(engine, left, outputs, progress)
+        travel(engine, tape, begun, engine.end, progress, stop, judge, jumps)
     return _collect(engine, tape)
+
+
+def travel(
+    engine: Engine,
+    tape: Tape,
+    begun: float,
+    until: float,
+    progress: Progress,
+    stop: Stop,
+    judge: Judge,
+    jumps: Jumps | None = None,
+) -> None:
+    """Integrate to a time [s], from break to break; begun: breaks up to this time have been prepared.
+
+    Other arguments as of `integrate`.
+    """
+    sample, control = _sampler(engine), engine.control
+    for a, b in pairwise(engine.breaks):
+        if b <= control[m.TIME] or a >= until:
+            continue
+        if a > begun:
+            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
+            if jumps is not None:
+                jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
+            engine.select_pieces_after(0.5 * (a + b))
+            engine.n[m.FRESH] = 1
+        control[m.END] = min(b, until)
+        if _segment(engine, tape, progress, stop, judge, jumps):
+            break
 
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
@@ -165,8 +180,9 @@ def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     return lambda y, t: reduce(lambda state, sample: sample(state, t), samplers, y)
 
 
-def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
+def begin(engine: Engine, y: np.ndarray, outputs: np.ndarray, progress: Progress) -> Tape:
     """Return a tape with its first row; begin contacts that are closed at the start; prepare a singular start."""
+    engine.specialised.rows.clear()
     y = _sampler(engine)(y, engine.start)
     tape = _prepare(engine, y, engine.start, outputs)
     first = recording.record(tape.rows[:1], len(engine.model.contacts))
@@ -177,11 +193,20 @@ def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
         first.modes[:], first.latched[:] = engine.modes, engine.latched
     if engine.mobility.singular_start:
         _leave_singular_start(engine, tape)
+    return _ready(engine, tape, progress)
+
+
+def _ready(engine: Engine, tape: Tape, progress: Progress) -> Tape:
+    """Return the tape of an integration that is ready to step."""
+    engine.n[m.FRESH] = 1
+    engine.settle(progress)
+    tape.looks.append(look(engine))
     return tape
 
 
-def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
+def resume(engine: Engine, left: Handover, outputs: np.ndarray, progress: Progress) -> Tape:
     """Return a tape with another method's record, and set the engine to that method's last state."""
+    engine.specialised.rows.clear()
     here, before = left.here, left.tape
     tape, n = _prepare(engine, here.y, left.time, outputs), engine.n
     cap = n[m.CAP]
@@ -193,13 +218,13 @@ def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
     same = np.array_equal(before.selections[-1][1], engine.selected)
     tape.selections = [*before.selections, *([] if same else tape.selections)]
     tape.collocations, tape.passes = [*before.collocations], [*before.passes]
-    return tape
+    return _ready(engine, tape, progress)
 
 
 def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Tape:
     """Prepare work array and empty tape of an integration from state y at time t."""
     model, n, control = engine.model, engine.n, engine.control
-    solver, contacts = model.scene.solver, len(model.contacts)
+    solver = model.scene.solver
     engine.select_pieces_after(t)
     engine.reset()
     control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
@@ -211,10 +236,15 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     n[m.STATUS : m.INTEGERS] = 0
     n[m.CAP] = solver.evaluations
     engine.modes[:], engine.latched[:] = 0, 0.0
+    return replace(blank(engine, outputs), selections=[(t, _select(engine, y, t))])
+
+
+def blank(engine: Engine, outputs: np.ndarray) -> Tape:
+    """Return an empty tape."""
+    contacts = len(engine.model.contacts)
     room = EVENT_ROWS if contacts else m.ROOM
-    rows = recording.empty_record(len(outputs) + room + m.ROOM + recording.BETWEEN, contacts, len(y))
-    events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
-    return Tape(outputs, rows, events, [(t, _select(engine, y, t))])
+    rows = recording.empty_record(len(outputs) + room + m.ROOM + recording.BETWEEN, contacts, engine.model.ny)
+    return Tape(outputs, rows, np.full((room + m.ROOM, m.EVENT.size), np.nan), [])
 
 
 def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:

@@ -15,6 +15,7 @@ from typing import Any
 
 from llvmlite import ir
 
+from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.specialise.tape import BIT, COMPARISONS, FLOAT, INTEGER, Branch, Loop, Symbol
 
 #: as for all kernels (`dynamics.kernels`)
@@ -159,6 +160,8 @@ class Emitter:
         return ir.Constant(self.types[kind], value if self.lanes == 1 else [value] * self.lanes)
 
     def _place(self, index: Any, lane: int) -> Any:
+        if found := topologies.based(index):
+            return found[0], self._of(self.values[found[1]], lane)
         return self._of(self.values[index], lane) if isinstance(index, Symbol) else index
 
     # Lanes -------------------------------------------------------------------------------------------------------

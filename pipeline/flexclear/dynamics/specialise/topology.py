@@ -70,3 +70,14 @@ def ground(h: list[int]) -> dict[int, Any]:
         **{index: 1.0 for index in axes},
         **{index: 0.0 for index in range(own, own + m.OWN.size)},
     }
+
+
+def based(index: Any) -> tuple[int, Any] | None:
+    """Return the first entry of a work array, and the symbol that is added, for an index that is known when code runs.
+
+    None for an index that is a number, or counts from the begin of h, f, w or n itself.
+    """
+    if getattr(index, "operation", "") != "iadd":
+        return None
+    first, second = index.arguments
+    return (second, first) if isinstance(second, int) and second >> STRETCH else None

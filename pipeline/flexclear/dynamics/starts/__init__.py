@@ -4,11 +4,11 @@
 Each module has a function ``begin(scene, bundles, progress) -> (Scene, str)``: the scene with the poses, velocities and
 modal coordinates of that start in place of its own, and `Mechanism.choice` of the mechanism that gave them;
 and ``placed(scene) -> Scene``: the scene whose joints and drives position the bodies there, which `flexclear check`
-builds.
+builds.  `recorded` is that of ``[start] from``.
 """
 
 from __future__ import annotations
 
-from flexclear.dynamics.starts import equilibrium, ideal
+from flexclear.dynamics.starts import equilibrium, ideal, recorded
 
-STARTS = {"equilibrium": equilibrium, "ideal": ideal}
+STARTS = {"equilibrium": equilibrium, "ideal": ideal, "recorded": recorded}

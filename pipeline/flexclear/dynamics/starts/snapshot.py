@@ -18,6 +18,7 @@ from flexclear.scene.clearance import Clearance
 from flexclear.scene.drives import JointDrive
 from flexclear.scene.fields import Pose
 from flexclear.scene.laws import Constant, Polynomial
+from flexclear.scene.loads import JointForce
 from flexclear.scene.parts import Ground, Stop
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import JointStart, ModalStart, Start
@@ -41,7 +42,7 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
         placement, frame = model.links[i].placements[name], frames[i]
         p = frame["origin"] + frame["axes"] @ placement.p + model.mechanism.origin
         quaternion = matrix_to_quaternion(frame["axes"] @ placement.R)
-        pose = Pose(position=tuple(_given(p)), quaternion=tuple(_given(quaternion)))
+        pose = Pose(position=tuple(writable(p)), quaternion=tuple(writable(quaternion)))
         bodies[name] = body.model_copy(update={"pose": pose})
     given = scene.start.modal if scene.start is not None else {}
     modal = {
@@ -79,10 +80,10 @@ def resting(scene: Scene, contacts: Mapping[str, Clearance], stops: Mapping[str,
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:
     """Return the values of the modes of flexible bodies, by name."""
-    return {str(engine.model.links[i].flexible): _given(values[own]) for i, own in numbers.items()}
+    return {str(engine.model.links[i].flexible): writable(values[own]) for i, own in numbers.items()}
 
 
-def _given(values: np.ndarray) -> Any:
+def writable(values: np.ndarray) -> Any:
     """Return computed values as a scene may give them; rounding below the smallest number of scenes becomes zero."""
     return np.where(np.abs(values) < 1.0 / LARGEST_NUMBER, 0.0, values).tolist()
 
@@ -91,7 +92,7 @@ def _start_without_poses(scene: Scene, modal: dict[str, ModalStart]) -> Start:
     """Return the start without entries that the poses now replace."""
     old = scene.start if scene.start is not None else Start()
     rates = joint_starts(old, lambda one: None if one.velocity is None else JointStart(velocity=one.velocity))
-    return old.model_copy(update={"at": None, "joint": rates, "modal": modal})
+    return old.model_copy(update={"at": None, "run": None, "recorded": {}, "joint": rates, "modal": modal})
 
 
 def held(scene: Scene, starts: Iterable[Given], law: Callable[[Given, float], Constant | Polynomial]) -> dict[str, Any]:
@@ -105,6 +106,19 @@ def held(scene: Scene, starts: Iterable[Given], law: Callable[[Given, float], Co
                 joint=start.joint, coordinate=start.coordinate.name, law=law(start, start.position)
             )
     return drives
+
+
+def released(scene: Scene, forces: Mapping[str, float]) -> Scene:
+    """Return the scene with constant forces [N or N m] in place of drives of joints, named ``drive.<name>``."""
+    loads: dict[str, Any] = {}
+    for name, force in forces.items():
+        drive: Any = scene.drive[name]
+        law = Constant(type="constant", value=force)
+        loads[f"drive.{name}"] = JointForce(
+            type="joint-force", joint=drive.joint, coordinate=drive.coordinate, force=law
+        )
+    kept = {name: drive for name, drive in scene.drive.items() if name not in forces}
+    return scene.model_copy(update={"drive": kept, "load": {**scene.load, **loads}})
 
 
 def joint_starts(start: Start, left: Callable[[JointStart], JointStart | None]) -> dict[str, dict[str, JointStart]]:

@@ -102,7 +102,8 @@ def mechanism(
 
     stressed: True colours flexible bodies by von Mises stress.  InputError for a run that records none.
     """
-    looks, at = looks or Looks(), Layout(run, parameters(run), bundles)
+    looks = looks or Looks()
+    at = Layout(run, shown_parts(parameters(run), looks), bundles)
     if stressed and not body_shape.stress_recorded(run):
         problem = "the run records no von Mises stress"
         raise InputError(
@@ -120,6 +121,21 @@ def mechanism(
     top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
     shown = cloud(run, parts, flexible, samples(run))
     return Mechanism(run, parts, flexible, chosen_view, size, shown, looks, top)
+
+
+def shown_parts(text: Mapping[str, Any], looks: Looks) -> dict[str, Any]:
+    """Return the parts of a scene without bodies of no shape that carry nothing, and without what acts on them."""
+    sides = [{frame.partition(".")[0] for frame in one["between"]} for one in text.get("joint", {}).values()]
+    unshaped = {name for name, look in looks.bodies.items() if not look.get("geometry", True)}
+    without = {name for name in unshaped if sum(name in both for both in sides) == 1}
+    bearings = {name for name, both in zip(text.get("joint", ()), sides, strict=True) if not without.isdisjoint(both)}
+
+    def drawn(name: str, part: Any) -> bool:
+        ends = [*part.get("between", ()), *(str(part.get(key, "")) for key in ("joint", "first", "second", "frame"))]
+        return name not in without and (without | bearings).isdisjoint(end.partition(".")[0] for end in ends)
+
+    families = {"body", "joint", "drive", "load", "stop", "gear"} if without else set()
+    return {key: {n: p for n, p in one.items() if drawn(n, p)} if key in families else one for key, one in text.items()}
 
 
 def cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible], steps: Sequence[int]) -> np.ndarray:
@@ -197,7 +213,7 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
             key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
             key = (rod_of(name, body),) if "segment" in body else key
             color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
-            solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
+            solid = equivalent(body["mass"], inertia) if np.any(inertia) and body["mass"] else None
             drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
             if len(drawn.points):
                 yield Part(owner, surfaces.moved(drawn, -com), color)

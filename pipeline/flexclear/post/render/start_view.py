@@ -73,7 +73,8 @@ def start_view(
     run: xr.Dataset, bundles: Mapping[str, xr.Dataset], gaps: Sequence[Missing], looks: mechanism.Looks | None = None
 ) -> StartView:
     """Return the view of a start; gaps: of joints that do not fit."""
-    text, drawn = parameters(run), mechanism.mechanism(run, bundles, looks)
+    drawn = mechanism.mechanism(run, bundles, looks)
+    text = mechanism.shown_parts(parameters(run), drawn.looks)
     at = layout.Layout(run, text, bundles)
     # world position of each joint's second frame, and the axes of its first one
     joints = {
@@ -214,7 +215,8 @@ def _marks(
         pair = [gear["first"], gear["second"]]
         where = np.mean([joints[one.partition(".")[0]][0] for one in pair], axis=0)
         yield Mark(name, f"gear {gear['ratio']}: {' – '.join(pair)}", where, JOINT)
-    rest = {_frame(name, bodies): where for name, where in positions.items() if name not in used}
+    free = {name: where for name, where in positions.items() if name not in used and name.partition(".")[0] in bodies}
+    rest = {_frame(name, bodies): where for name, where in free.items()}
     for name, where in rest.items():
         yield Mark(name, "frame", where, FRAME)
 

@@ -87,6 +87,7 @@ MODELS: dict[str, type[Recipe]] = {
     "cylinder": SolidRecipe,
     "block": SolidRecipe,
     "mesh-file": SolidRecipe,
+    "step": SolidRecipe,
     "matrices": MatricesRecipe,
 }
 

@@ -15,6 +15,7 @@ SHAPES = {
     "cylinder": "solid",
     "block": "solid",
     "mesh-file": "solid",
+    "step": "solid",
     "matrices": "matrices",
 }
 

@@ -24,6 +24,7 @@ from flexclear.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import start_errors
 from flexclear.dynamics.run import bushings, joint_friction
+from flexclear.dynamics.run.evaluation import table_ranges
 from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
     address,
@@ -239,8 +240,9 @@ class Engine:
         return self.view(m.LATCHED)
 
     def explained(self) -> str | None:
-        """Reason for which an effect ends the run; None when none does."""
-        reasons = (explain(self) for explain in self.model.parts.functions(EXPLANATIONS))
+        """Reason for which an effect, or a table, ends the run; None when none does."""
+        explains = [*self.model.parts.functions(EXPLANATIONS), table_ranges.explanation]
+        reasons = (explain(self) for explain in explains)
         return next((why for why in reasons if why is not None), None)
 
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
@@ -280,12 +282,14 @@ def prepare(model: Model, progress: Progress) -> Engine:
     return assemble(model, entry, METHODS[solver.integrator], mobility)
 
 
-def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mobility) -> Engine:
-    """Return an engine with a new work array for a model whose functions are compiled."""
+def assemble(
+    model: Model, entry: functions.Entry, method: Method, mobility: Mobility, kind: type[Engine] = Engine
+) -> Engine:
+    """Return an engine of a kind with a new work array for a model whose functions are compiled."""
     space = model.arrays.work_space(method.room)
     entry.connect(space.h)
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    engine = Engine(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
+    engine = kind(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
     engine.reset()
     engine.connect()
     return engine
@@ -293,7 +297,7 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
 
 def another(engine: Engine) -> Engine:
     """Return a new engine of the same model, in the state before any run."""
-    made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
+    made = assemble(engine.model, engine.entry, engine.method, engine.mobility, type(engine))
     made.specialised.exact = engine.specialised.exact
     made.specialised.addresses = engine.specialised.addresses.copy()
     made.specialised.lists = engine.specialised.lists.copy()

@@ -10,6 +10,7 @@ import numpy as np
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model import initial
 from flexclear.dynamics.model.given_start import corrected_starts
+from flexclear.dynamics.model.internal_states import recorded_states
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.plausibility import refuse_depth
 from flexclear.dynamics.run.evaluation import closure_rows
@@ -49,7 +50,7 @@ def closed_start(engine: Engine) -> np.ndarray:
     if model.loads or model.arrays.size(m.N_INTERNAL):
         _look(engine, y)
         y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
-    return y
+    return recorded_states(model, y)
 
 
 def start_motions(engine: Engine) -> initial.Motions:

@@ -12,6 +12,7 @@ from flexclear.artifacts.quantities import combined
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.driving import coordinate_of, label, prescribed
 from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.scene.expression import Lookup
 from flexclear.scene.formulas import written
 from flexclear.scene.loads import EXPRESSIONS
 from flexclear.scene.quantity import Quantity
@@ -104,6 +105,9 @@ def _repeats(steps: list[Any], start: float, period: float, changes: Mapping[str
         grows = isinstance(one, Quantity) and one.kind == "joint_position"
         return given[one] + later * (changes.get(one.owner, 0.0) if grows else 0.0)
 
+    # a table repeats where what it is over does: at random sizes, outside of the table, its sum stands for it
+    sums = (["+"] * (len(step.of) - 1) if isinstance(step, Lookup) else [step] for step in steps)
+    steps = [step for some in sums for step in some]
     with np.errstate(all="ignore"):  # powers of negative numbers
         both = [combined(steps, partial(read, later=later)) for later in (0.0, 1.0)]
         now, then = (np.broadcast_to(v, (len(times), v.shape[1])).reshape(MOTIONS, TIMES, -1) for v in both)

@@ -187,7 +187,7 @@ def assemble(mesh: xr.Dataset) -> Model:
     K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
     rigid = models.rigid_motions(positions, component, positions.mean(axis=0))
     _check(K, M, rigid, positions)
-    frames = models.interfaces(mesh, partial(_motion, mesh, component))
+    frames = models.interfaces(mesh, partial(frame_motion, mesh, component))
     names = mesh.attrs["interfaces"].split()
     return Model(
         stiffness=K,
@@ -278,7 +278,7 @@ def _from_moments(mesh: xr.Dataset, vectors: np.ndarray) -> Integrals:
     )
 
 
-def _motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_array:
+def frame_motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_array:
     """Return the motion of frame k, that of its node or the mean motion of its nodes, shape (6, ndof)."""
     tied, node = mesh["tie_node"].values[mesh["tie_frame"].values == k], mesh["unknown_node"].values
     count = 6 if len(tied) == 1 else 3
@@ -288,6 +288,21 @@ def _motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_array:
         return pick
     x = mesh["unknown_position"].values[rows[:, 0]]
     return sp.csr_array(ties.mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x)) @ pick)
+
+
+def nodal_loads(mesh: xr.Dataset) -> dict[str, list[tuple[str, int, np.ndarray]]]:
+    """Return the nodes that carry the load on each frame: node, degree of freedom from 1 on, and what it carries.
+
+    That is its force or moment per force and moment on the frame, shape (6,).  They do the same work as the wrench: a
+    mean motion distributes it as tractions.
+    """
+    component = np.array([COMPONENTS.index(name) for name in mesh["unknown_component"].values])
+    found = {}
+    for k, name in enumerate(mesh["frame"].values):
+        columns = frame_motion(mesh, component, k).tocsc()
+        moved, node = np.unique(columns.nonzero()[1]), mesh["unknown_node"].values
+        found[str(name)] = [(str(node[u]), int(component[u]) + 1, columns[:, [u]].toarray()[:, 0]) for u in moved]
+    return found
 
 
 def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:

@@ -11,10 +11,10 @@ import xarray as xr
 from flexclear.artifacts.schema import SOLID, conform
 from flexclear.structure.fe.model import grouped
 from flexclear.structure.fe.solid import geometry as geometries
-from flexclear.structure.fe.solid import imported, ties
+from flexclear.structure.fe.solid import imported, step, ties
 from flexclear.structure.fe.solid.elements import ELEMENTS
 from flexclear.structure.fe.solid.geometry import Geometry
-from flexclear.structure.fe.solid.recipe import MeshFile, SolidRecipe
+from flexclear.structure.fe.solid.recipe import MeshFile, SolidRecipe, StepFile
 from flexclear.structure.fe.vtu import vtu
 from flexclear.system.errors import InputError
 
@@ -23,7 +23,12 @@ def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
     """Build the mesh dataset (schema SOLID); raise InputError for faulty meshes and frames."""
     where = f"{path} [shape]"
     shape = recipe.shape
-    geometry = imported.read(shape, folder, where) if isinstance(shape, MeshFile) else geometries.generated(shape)
+    if isinstance(shape, StepFile):
+        geometry = step.read(shape, folder, where)
+    elif isinstance(shape, MeshFile):
+        geometry = imported.read(shape, folder, where)
+    else:
+        geometry = geometries.generated(shape)
     geometries.check(geometry, where)
     names, region = _materials(recipe, geometry, path)
     materials = [recipe.materials.get(name) or recipe.material for name in names]

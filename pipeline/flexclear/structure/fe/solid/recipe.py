@@ -66,6 +66,20 @@ class MeshFile(Part):
     """unit of the coordinates, which the file does not state"""
 
 
+class StepFile(Part):
+    """A solid of a STEP file, meshed by Gmsh (`pip install 'flexclear[cad]'`); the file states its own unit."""
+
+    type: Literal["step"]
+    file: str
+    """path of the STEP file, relative to the recipe"""
+    size: Annotated[Length, Positive]
+    """largest size of the cells; round surfaces have smaller ones"""
+    solid: Annotated[int, Field(ge=1)] = 1
+    """number of the solid in the file, from 1"""
+    element: Literal["tet4", "tet10"] = "tet10"
+    """type of the cells"""
+
+
 def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(direction):
         raise ValueError("a direction must not have length zero")
@@ -141,7 +155,7 @@ class TiedFrame(TurnedFrame):
 class SolidRecipe(BodyRecipe):
     """A solid body."""
 
-    shape: Annotated[Cylinder | Block | MeshFile, Field(discriminator="type")]
+    shape: Annotated[Cylinder | Block | MeshFile | StepFile, Field(discriminator="type")]
     """shape of the solid"""
     material: Isotropic | None = None
     """material of all cells; `materials` gives one for each region"""

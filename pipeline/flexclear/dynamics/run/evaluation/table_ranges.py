@@ -1,0 +1,36 @@
+"""Explanation of a run that ends where the expression of a load leaves its table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flexclear.dynamics import fields
+from flexclear.dynamics.compile.formulas import looked_up
+from flexclear.dynamics.loads import looks
+from flexclear.dynamics.loads.lookup import ROUNDING
+from flexclear.scene.expression import Lookup
+from flexclear.scene.formulas import formula, written
+
+
+def explanation(engine: Any) -> str | None:
+    """Return table, quantity and value for the first load that leaves a table in the state evaluated last."""
+    scene, d = engine.model.scene, fields.data(engine.h, engine.model.arrays.f, engine.w, engine.n)
+    for k, (name, _) in enumerate(engine.model.loads):
+        load: Any = scene.load.get(name)
+        known = formula(scene, name) if getattr(load, "tables", None) else None
+        if known is None:
+            continue
+        scope: dict[str, Any] = {"looks": looks}
+        exec(looked_up(known.code), scope)
+        units = {step.name: step.of for _, steps in written(scene, load) for step in steps if isinstance(step, Lookup)}
+        for number, values in scope["looked_up"](d, k):
+            called, table = list(load.tables.items())[number]
+            for column, unit, axis, value in zip(table.of, units[called], table.axes(), values, strict=True):
+                near = ROUNDING * (axis[-1] - axis[0])  # of the last state that can be evaluated
+                if not axis[0] + near < value < axis[-1] - near:
+                    what = column.column if isinstance(column.column, str) else f"column {column.column}"
+                    return (
+                        f"load {name}: {what} = {value:.6g} {unit} leaves table {called} ({table.file}), whose "
+                        f"points are at {axis[0]:.6g} to {axis[-1]:.6g} {unit}; add points, or limit it by max and min"
+                    )
+    return None
