@@ -1,4 +1,4 @@
-"""A mechanism of rigid and flexible bodies as objects, and the calls that compute the rates of its state."""
+"""A mechanism of rigid and flexible bodies as objects."""
 
 from __future__ import annotations
 
@@ -53,8 +53,15 @@ class Frame:
         """Site on the body as that is deformed, and its motion per rate of each shape; once the body is placed."""
         if isinstance(self.undeformed, Site):
             return self.undeformed, ()
-        link, modes = self.carrier, self.carrier.modes
-        return f.at_port(modes.held, link.motion, modes.twists, self.undeformed, *modes.moving)
+        modes = self.modes
+        return f.at_port(modes.held, self.carrier.motion, modes.twists, self.undeformed, *modes.moving)
+
+    @property
+    def modes(self) -> Modes:
+        """Modes of the flexible body that it is on."""
+        assert isinstance(self.carrier, Link)
+        assert self.carrier.modes is not None
+        return self.carrier.modes
 
     @property
     def placed(self) -> tuple[Motion, Site]:
@@ -66,7 +73,7 @@ class Frame:
         """The part of the acceleration of its body with the frame that is from unknown rates of speeds."""
         if not self.deformed[1]:
             return self.carrier.acceleration
-        return f.follow(self.carrier.acceleration, self.deformed[1], self.carrier.modes.accelerations)
+        return f.follow(self.carrier.acceleration, self.deformed[1], self.modes.accelerations)
 
     def resist(self, resistance: Resistance) -> None:
         """Let the body resist, through this frame, what is about the origin of the body."""
