@@ -200,11 +200,18 @@ def right_hand_side(model: Model) -> Any:
     return scope["right_hand_side"]
 
 
-def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any = float) -> Evaluated:
-    """An evaluation off the start, contacts closed, without a compiler.
+def evaluated(
+    model: Model,
+    speeds: float = 0.1,
+    turns: float = 0.0,
+    number: Any = float,
+    internal: float = 0.0,
+    closed: np.ndarray | int = 1,
+) -> Evaluated:
+    """An evaluation off the start without a compiler.
 
-    speeds, turns: sizes of random changes of the speeds, and of the positions of a tree of hinges [rad].  number: type
-    of the floats.
+    speeds, turns, internal: sizes of random changes of the speeds, of the positions of a tree [rad or m], and of the
+    states of contacts and loads.  number: type of the floats.  closed: modes of the contacts.
     """
     space, f, random = model.arrays.work_space(m.Room(2, 0)), model.arrays.f, np.random.default_rng(1)
     h, n, start = space.h, space.n, initial.start_state(model)
@@ -212,10 +219,12 @@ def evaluated(model: Model, speeds: float = 0.1, turns: float = 0.0, number: Any
     start[model.speeds] += speeds * random.normal(size=model.nv)
     if turns:
         start[: model.nq] += turns * random.normal(size=model.nq)
+    if internal:
+        start[model.speeds.stop :] += internal * random.normal(size=model.ny - model.speeds.stop)
     for link, modes in model.numbering.modal_positions.items():  # a millimetre or so
         start[modes] = 1e-3 * model.links[link].mass ** 0.5 * random.normal(size=len(modes))
     w = space.w.astype(number)
-    w[y : y + model.ny], n[n[m.MODE] :] = start, 1
+    w[y : y + model.ny], n[n[m.MODE] : n[m.MODE] + len(model.contacts)] = start, closed
     w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
     n[n[m.ACTIVE] : n[m.ACTIVE] + model.arrays.size(m.N_LAWS)] = model.arrays.table(m.LAWS)["piece0"]
     plain = (Trace(0) if number is float else Long(0)).plain(right_hand_side(model))

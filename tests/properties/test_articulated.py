@@ -16,6 +16,7 @@ from flexclear.dynamics.equations.closures import make_closing
 from flexclear.dynamics.equations.projection import make_stiffen
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.mechanics.of_topology import program_of
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.model.mechanism import build
@@ -26,7 +27,6 @@ from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
-from flexclear.dynamics.specialise import program
 from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.dynamics.specialise.trace import Trace
 from flexclear.scene.load import load_scene
@@ -37,7 +37,7 @@ from tests.properties import tapes
 from tests.properties.articulated_chains import Evaluated, Long, bending, evaluated, reduced, rods, tabulated
 from tests.properties.mechanisms import Table
 from tests.properties.test_closure_rows import dense_factor
-from tests.properties.test_specialised import description_kernel, rates_kernel
+from tests.properties.test_specialised import description_kernel
 
 #: of the largest; the mass matrix of the chains here has a condition of 1e5 at most, of which 2e-12 was left
 ROUNDING = 1e-9
@@ -233,15 +233,12 @@ def test_flexible_bodies_have_the_mass_that_their_energy_says(name: str) -> None
 
 @pytest.mark.parametrize("name", ["branches", "held shapes in a loop", "driven loop", "stiffened"])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_specialised_code_of_flexible_bodies_computes_what_kernels_do(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(program, "LONGEST", 200_000)
+def test_straight_code_of_flexible_bodies_computes_what_kernels_do(name: str) -> None:
     found, _ = bent(name)
     model, h, w, n = found.model, found.h, found.w.copy(), found.space.n.copy()
     y, dy = int(h[m.Y]), int(h[m.SLOPES])
     w[dy : dy + model.ny] = 0.0
-    tape = program.program(rates_kernel(model), topology_of(model.arrays, h))
+    tape = program_of(model.parts, topology_of(model.arrays, h), 200_000)
     tapes.run(tape, h, {"f": model.arrays.f, "w": w, "n": n}, y, dy)
     assert apart(w[dy : dy + model.ny], found.rates) < ROUNDING
 

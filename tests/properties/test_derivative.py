@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.mechanics.of_topology import program_of
 from flexclear.dynamics.model import initial
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
@@ -52,7 +53,7 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int) -> list[np.ndarr
     df, dw = f * random.normal(size=len(f)), np.zeros(len(w))
     dw[laws], dw[impacts] = random.normal(size=laws.stop - laws.start), random.normal(size=len(model.contacts))
     direction = random.normal(size=model.ny) * np.maximum(np.abs(begin), 1e-3)
-    made = program.program(kernel, topology_of(model.arrays, h), longest=program.LONGEST_DIFFERENTIATED)
+    made = program_of(model.parts, topology_of(model.arrays, h), program.LONGEST_DIFFERENTIATED)
 
     exact = {"f": f, "w": w.copy(), "n": n.copy(), "df": df, "dw": dw}
     exact["w"][vy : vy + model.ny] = direction

@@ -1,47 +1,53 @@
 """Routines compute what kernels do: rates, what steps read besides, and reports; and one code serves any length."""
 
 import ctypes
-import re
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from benchmarks.families.growth import four_bars, hinged
+from benchmarks.families.growth import four_bars
 from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile import functions
-from flexclear.dynamics.mechanics import closures, trees
-from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, _series
-from flexclear.dynamics.mechanics.mechanism import evaluation, status
-from flexclear.dynamics.mechanics.of_model import mechanism_of
+from flexclear.dynamics.mechanics import closures, flexible, trees
+from flexclear.dynamics.mechanics.evaluation import REPORTS, status
+from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
+from flexclear.dynamics.mechanics.of_topology import list_of
 from flexclear.dynamics.mechanics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
-from flexclear.dynamics.routines import store
-from flexclear.dynamics.routines.calls import RESULTS, SCENE, CallList, Cell, cells, routine
 from flexclear.dynamics.routines.store import load
-from flexclear.dynamics.routines.symbols import UndecidableError, branch, larger, smaller
-from flexclear.dynamics.run.evaluation import specialised_code
+from flexclear.dynamics.run.evaluation import engine, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
-from flexclear.dynamics.run.trajectory import integrate
+from flexclear.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import movable
-from tests.properties.articulated_chains import Evaluated, evaluated, rods, tabulated
+from tests.properties.articulated_chains import Evaluated, bending, evaluated, rods, tabulated
 from tests.properties.mechanisms import two_loops
 from tests.properties.movable_units import UNITS
-from tests.properties.test_articulated import MIXED, TREES, apart, massless
+from tests.properties.test_articulated import (
+    BENT,
+    BOTH,
+    FIXED,
+    FREE,
+    MANY,
+    MIXED,
+    NONE,
+    ONE,
+    TREES,
+    apart,
+    massless,
+)
 
 #: of the largest rate of a kind; measured 5e-12 at worst: kernels refer wrenches to a distant origin
 ROUNDING = 1e-10
@@ -64,7 +70,7 @@ def by_routines(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
     y, dy, rows = int(h[m.Y]), int(h[m.SLOPES]), model.arrays.size(m.N_CLOSURE_ROWS)
     for begin, count in ((dy, model.ny), (h[m.RESIDUAL], rows), (h[m.RESIDUAL_RATE], rows), (h[m.PIVOT], min(rows, 1))):
         w[begin : begin + count] = np.nan
-    calls = load(evaluation(mechanism_of(model, h)), silent_text).instance()
+    calls = load(list_of(model.parts, topology_of(model.arrays, h)), silent_text).instance(h)
     h[m.PRESCRIBE], h[m.CALLS] = ctypes.cast(NO_LAWS, ctypes.c_void_p).value, calls.words.ctypes.data
     _EVALUATE(calls.loaded.interpreter)(*(array.ctypes.data for array in (h, f, w, n)), 0.1, y, dy)
     return w, n
@@ -77,7 +83,7 @@ def silent_text(text: str) -> None:
 def assert_alike(found: Evaluated) -> None:
     """Rates of positions, speeds and ledger; residuals, rates and pivots of the loops; the report."""
     model, h, (w, n) = found.model, found.h, by_routines(found)
-    assert has_routines(model.parts)
+    assert has_routines(model)
     rates, speeds = w[h[m.SLOPES] :][: model.ny], model.speeds
     for part in (slice(speeds.start), speeds, slice(speeds.stop, None)):
         assert apart(rates[part], found.rates[part].astype(float)) < ROUNDING
@@ -98,6 +104,12 @@ def assert_alike(found: Evaluated) -> None:
 @pytest.mark.parametrize("name", TREES)
 def test_trees_move_as_by_kernels(name: str) -> None:
     assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]), True)))
+
+
+@pytest.mark.parametrize("name", [name for name in BENT if "friction" not in name])
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_flexible_bodies_move_as_by_kernels(name: str) -> None:
+    assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]), True)))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -139,6 +151,30 @@ def opened(number: int) -> Model:
 def test_random_mechanisms_move_as_by_kernels(number: int) -> None:
     for model in (closed(number), opened(number)):
         assert_alike(evaluated(model))
+
+
+def bent(number: int) -> Model:
+    """Random rigid and flexible rods in a chain or a tree, often in a loop, some of them driven, or stiffened."""
+    random = np.random.default_rng([number, 9])
+    stiffening, count = bool(random.random() < 0.4), int(random.integers(2, 6))
+    modes = (BOTH, ONE, NONE, FREE, FIXED, None, *(() if stiffening else (MANY,)))
+    references = (FREE, *(modes[k] for k in random.integers(len(modes), size=count - 1)))
+    turned = bool(random.random() < 0.7)  # against each other, so that joints must turn about z
+    free = ("revolute", "spherical", "cylindrical", "planar") if turned else (*MIXED, "fixed", "free")
+    kinds = tuple(random.choice(free, size=3).tolist())
+    children = int(random.integers(1, 3))
+    last = count if children == 1 else 2  # rods that turn against the one before them
+    driven = tuple(k for k in range(last) if kinds[k % 3] == "revolute" and random.random() < 0.4)
+    given = {"children": children, "closed": str(random.choice(["", "spherical", "revolute"]))}
+    angles = tuple((turned * random.uniform(-1.2, 1.2, size=3)).tolist())
+    scene = bending(references, kinds, angles, **given, driven=driven, stiffening=stiffening)
+    return tabulated(Scene.model_validate(scene), True)
+
+
+@pytest.mark.parametrize("number", range(20))
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_random_flexible_mechanisms_move_as_by_kernels(number: int) -> None:
+    assert_alike(evaluated(bent(number)))
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
@@ -214,18 +250,29 @@ def test_positions_of_joints_are_those_that_poses_have(kind: str) -> None:
 
 def test_series_of_rotation_vectors_go_over_into_closed_forms() -> None:
     """The rates of the coefficients, which are differences over the squared angle of 0.01, lose four digits more."""
-    series, exact = (of(SERIES_ANGLE) for of in (_series, _closed))
-    assert series[:3] == pytest.approx(exact[:3], abs=1e-13)
-    assert series[3:] == pytest.approx(exact[3:], abs=1e-11)
+    found, exact = (of(SERIES_ANGLE) for of in (series, _closed))
+    assert found[:3] == pytest.approx(exact[:3], abs=1e-13)
+    assert found[3:] == pytest.approx(exact[3:], abs=1e-11)
 
 
 @pytest.mark.parametrize("mass, sound", [(1e-13, 1.0), (1e-15, 0.0), (np.nan, 0.0)])
 def test_a_coordinate_moves_mass_or_rounding(mass: float, sound: float) -> None:
     """As share of the mass that it carries; on floats."""
     still = trees.ground([0.0, 0.0, 0.0])
-    body = trees.Body(mass, ZERO, Symmetric([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), 1.0, 1.0)
+    body = trees.Body(mass, ZERO, Symmetric([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     step = trees.Step([trees.Twist(ZERO, Vector([0.0, 0.0, 1.0]))], ZERO)
-    assert trees.eliminate(0, still, body, step, [], 1.0)[-1] == sound
+    assert trees.eliminate(0, still, body, trees.Bounds(1.0, 1.0), step, [], 1.0)[-1] == sound
+
+
+@pytest.mark.parametrize("mass, sound", [(2e-14, 1.0), (5e-15, 0.0), (np.nan, 0.0)])
+def test_a_shape_moves_mass_or_rounding(mass: float, sound: float) -> None:
+    """As share of its own, once another shape of the same motion is eliminated; on floats."""
+    none = [Wrench(ZERO, ZERO)] * 2
+    body = flexible.Need(
+        Inertia(*inertia_parts(np.random.default_rng(6))), none[0], none, [[1.0], [1.0, 1.0 + mass]], [0.0] * 2
+    )
+    with np.errstate(invalid="ignore"):
+        assert flexible.eliminate(body, [], np.float64(1.0))[-1] == sound
 
 
 @pytest.mark.parametrize(
@@ -241,7 +288,9 @@ def test_pivots_of_closures_count_as_share_of_their_row(
 
 def test_reports_of_an_evaluation() -> None:
     """Of massless coordinates first, then of pivots of the loops below 1e-13."""
-    found = [status(sound, least)[0] for sound, least in ((1.0, 1.0), (1.0, 2e-13), (1.0, 5e-14), (0.0, 0.0))]
+    found = [
+        status(REPORTS, *given)[0] for given in ((1.0, 1.0, 0.0), (1.0, 2e-13, 0.0), (1.0, 5e-14, 0.0), (0.0, 0.0, 0.0))
+    ]
     assert found == [m.OK, m.OK, m.SINGULAR, m.NOT_POSITIVE]
 
 
@@ -263,153 +312,6 @@ def inertia_parts(random: np.random.Generator) -> tuple[Symmetric, Matrix, Symme
     return A, Matrix(random.normal(size=9).tolist()), C
 
 
-# Routines -------------------------------------------------------------------------------------------------------------
-@routine
-def clipped(a: Any, b: Any) -> tuple[Any, Any, Any]:
-    """Smaller and larger one, and a / b unless b is not positive."""
-    return smaller(a, b), larger(a, b), branch(b > 0.0, lambda: a / b, lambda: 0.0 * a)
-
-
-@routine
-def undecided(a: Any) -> Any:
-    if a > 0.0:
-        return a
-    return -a
-
-
-def run(calls: CallList, f: np.ndarray) -> np.ndarray:
-    """Results of a list after it has run."""
-    found = load(calls, silent_text).instance()
-    h, n, w = np.zeros(m.HEADER, dtype=np.int64), np.zeros(m.INTEGERS, dtype=np.int64), np.zeros(1)
-    h[m.PRESCRIBE], h[m.CALLS] = ctypes.cast(NO_LAWS, ctypes.c_void_p).value, found.words.ctypes.data
-    _EVALUATE(found.loaded.interpreter)(*(array.ctypes.data for array in (h, f, w, n)), 0.0, 0, 0)
-    return found.results
-
-
-def test_routines_calculate_on_numbers_as_in_lists() -> None:
-    given = cells(SCENE, 0, 2)
-    with CallList().building() as calls:
-        results = clipped(*given)
-    for a, b in ((1.0, 2.0), (3.0, -0.5), (-1.0, 0.25)):
-        found = run(calls, np.array([a, b]))
-        assert [found[cell.index] for cell in results] == list(clipped(a, b))
-
-
-def test_conditions_of_python_on_symbols_are_refused_with_their_place() -> None:
-    line = undecided.__wrapped__.__code__.co_firstlineno + 2
-    told = rf"{re.escape(__file__)}:{line}: '>' .*write `branch` or `select`"
-    with pytest.raises(UndecidableError, match=told), CallList().building():
-        undecided(Cell(SCENE, 0))
-    assert undecided(-2.0) == 2.0
-
-
-def test_only_routines_calculate_with_numbers_in_memory() -> None:
-    with pytest.raises(TypeError, match="unsupported operand"):
-        Cell(SCENE, 0) + 1.0  # type: ignore[operator]
-
-
-def test_constant_results_and_arguments_stay_what_they_are() -> None:
-    """They need no memory, and the same call is made once."""
-
-    @routine
-    def parts(a: Any, b: Any) -> tuple[Any, Any, Any]:
-        return b, 2.0, a + b
-
-    a, b = cells(SCENE, 0, 2)
-    with CallList().building() as calls:
-        first, again = parts(a, b), parts(a, b)
-    assert first[:2] == (b, 2.0)
-    assert (first[2].array, first == again, len(calls.calls), calls.size) == (RESULTS, True, 1, 2)
-    assert run(calls, np.array([3.0, 4.0]))[first[2].index] == 7.0
-
-
-@cache
-def codes(loops: int, links: int) -> tuple[set[str], int]:
-    """Digests of the codes of a chain and of loops, and the number of calls."""
-    found, calls = set[str](), 0
-    for scene in (four_bars(loops, 0.3), hinged(links)):
-        model = tabulate(build(scene, {}))
-        made = evaluation(mechanism_of(model, model.arrays.work_space(m.Room(2, 0)).h))
-        found |= {code.digest for code in made.codes}
-        calls += len(made.calls)
-    return found, calls
-
-
-def test_another_length_has_no_other_code() -> None:
-    short, long = codes(5, 10), codes(12, 30)
-    assert long[0] == short[0]
-    assert long[1] > 2 * short[1]
-
-
-def test_numbers_of_a_scene_are_inputs() -> None:
-    """A list runs with other masses, and gravity, as one that is made for them."""
-    models = [tabulated(Scene.model_validate(rods(5) | more), True) for more in ({}, {"load": GRAVITY})]
-    models[1].arrays.f[models[1].arrays.h[m.LINK_NUMBERS.at] + m.LINK_NUMBERS.size] *= 3.0
-    lists = [evaluation(mechanism_of(model, model.arrays.work_space(m.Room(2, 0)).h)) for model in models]
-    assert [call.offsets for call in lists[0].calls] == [call.offsets for call in lists[1].calls]
-    assert [call.code.digest for call in lists[0].calls] == [call.code.digest for call in lists[1].calls]
-    assert_alike(evaluated(models[1]))
-
-
-def spoilt(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:-9] + b"otherwise")
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder of compiled code."""
-    for module in (functions, store):
-        monkeypatch.setattr(module, "writable", lambda root, report: tmp_path)
-    return tmp_path
-
-
-def test_code_is_compiled_once_and_again_when_damaged(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with CallList().building() as calls:
-        clipped(*cells(SCENE, 0, 2))
-    told: list[str] = []
-
-    def compiled_anew() -> bool:
-        told.clear()
-        monkeypatch.setattr(functions, "loaded", {})
-        load(calls, told.append)
-        return bool(told)
-
-    assert [compiled_anew(), compiled_anew()] == [True, False]
-    stored = sorted(folder.iterdir())
-    assert len(stored) == 2  # and the interpreter
-    for path in stored:
-        spoilt(path)
-    assert [compiled_anew(), compiled_anew()] == [True, False]
-
-
-def test_a_list_is_built_once_and_again_when_damaged(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Or when a code that it calls is."""
-    built: list[CallList] = []
-
-    def build() -> CallList:
-        with CallList().building() as calls:
-            clipped(*cells(SCENE, 0, 2))
-        built.append(calls)
-        return calls
-
-    def counts(topology: bytes = b"one") -> int:
-        """Lists built so far, after a new process has asked for one."""
-        for module in (functions, store):
-            monkeypatch.setattr(module, "loaded", {})
-        found = store.stored(topology, build, silent_text)
-        assert (len(found.codes), len(found.offsets), found.size) == (1, 2, 4)
-        return len(built)
-
-    assert [counts(), counts(), counts(b"other"), counts(b"other")] == [1, 1, 2, 2]
-    lists, codes = ([path for path in folder.iterdir() if ("list" in path.name) == kind] for kind in (True, False))
-    assert (len(lists), len(codes)) == (2, 2)
-    for path in lists:
-        spoilt(path)
-    assert [counts(), counts(), counts(b"other")] == [3, 3, 4]
-    spoilt(codes[0])
-    assert [counts(), counts(), counts(b"other")] == [5, 5, 5]
-
-
 # Steps ----------------------------------------------------------------------------------------------------------------
 def long(scene: Scene) -> Engine:
     """The engine of a scene as if it were too long for specialised code."""
@@ -418,21 +320,35 @@ def long(scene: Scene) -> Engine:
         return engine_of(scene, {}, silent)
 
 
-def test_steps_of_long_mechanisms_run_on_routines(monkeypatch: pytest.MonkeyPatch) -> None:
-    engines, runs = [long(four_bars(3, 0.3)) for _ in range(2)], []
-    for alone, one in enumerate(engines):
-        with monkeypatch.context() as patch:
-            if alone:
-                patch.setattr(Engine, "has_routines", False)
+#: ways of steps, and what makes the engine take them
+WAYS: dict[str, tuple[str, Any]] = {
+    "kernels": ("INTERPRETED", True),
+    "list": ("address", lambda *given, **more: 0),
+    "straight code": ("SELECTIONS", 4),
+}
+
+
+def by_ways(scene: Scene) -> dict[str, Trajectory]:
+    """Runs of a scene whose steps evaluate in each way."""
+    engines, runs = {way: long(scene) for way in WAYS}, {}
+    for way, one in engines.items():
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(engine, *WAYS[way])
             assert not one.has_specialised_code
-            runs.append(integrate(one, consistent_start(one), silent))
-    assert [one.h[m.RATES] == one.h[m.EVALUATE] for one in engines] == [False, True]
-    assert len({int(one.n[m.EVALUATIONS]) for one in engines}) == 1
-    assert apart(runs[0].state, runs[1].state) < 1e-9
+            runs[way] = integrate(one, consistent_start(one), silent)
+        assert bool(one.h[m.CALLS]) == (way == "list")
+        assert (one.h[m.RATES] == one.h[m.EVALUATE]) == (way == "kernels")
+    return runs
 
 
-def test_a_list_belongs_to_the_rows_that_are_selected() -> None:
+def test_steps_of_long_mechanisms_run_on_routines() -> None:
+    runs = by_ways(four_bars(3, 0.3))
+    assert all(apart(run.state, runs["kernels"].state) < 1e-9 for run in runs.values())
+
+
+def test_a_list_belongs_to_the_rows_that_are_selected(monkeypatch: pytest.MonkeyPatch) -> None:
     """With rows that depend on others the same pose is singular."""
+    monkeypatch.setattr(engine, *WAYS["list"])
     one = long(load_scene(TREE / "scenes/checks/four_bars_2.toml"))
     y, lists, reports = consistent_start(one), [], []
     kept = one.selected.copy()

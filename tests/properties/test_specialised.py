@@ -16,6 +16,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.choice import repeat
 from flexclear.dynamics.compile import compiler_process, files, functions, machine_code, sources
 from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.mechanics.of_topology import program_of
 from flexclear.dynamics.model import initial, selection
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.mobility import analyse
@@ -47,7 +48,7 @@ ROUNDING = 1e-9
 def rates_kernel(model: Model) -> Any:
     """The kernel that the specialised code is made from."""
     scope: dict[str, Any] = {}
-    exec(sources.specialised(model.parts, ()).partition("TOPOLOGY")[0], scope)
+    exec(sources.specialised(model.parts, (), sources.WHOLE).partition("TOPOLOGY")[0], scope)
     return scope["rates"]
 
 
@@ -98,20 +99,23 @@ def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> flo
 def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
     """Places in w of all that steps read of an evaluation besides its rates."""
     sizes = {m.TOUCH: len(model.contacts), m.LOAD_BENDS: model.arrays.size(m.N_LOAD_BENDS)}
-    sizes |= {m.NAMED[name]: model.arrays.size(m.SIZES["n_bearings"]) for name in ("bends", "bearing")}
+    bearings = model.arrays.size(m.SIZES["n_bearings"])
+    sizes |= {m.NAMED["bends"]: bearings}
     stretches = {table.at: table.size * rows for table, rows in sizes.items()}
     rows, kept = model.arrays.size(m.N_CLOSURE_ROWS), int(h[m.N_KEPT_ROWS])
     stretches |= {m.RESIDUAL: rows, m.RESIDUAL_RATE: rows, m.PIVOT: 1}
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[:kept]
     diagonal = h[m.SCHUR] + envelope["origin"] + np.arange(kept)
     scales = h[m.ROW_SCALE] + rows + np.arange(kept)
-    return [*(slice(h[place], h[place] + size) for place, size in stretches.items()), diagonal, scales]
+    loads = h[m.NAMED["bearing"].at] + m.NAMED["bearing"].load + m.NAMED["bearing"].size * np.arange(bearings)
+    return [*(slice(h[place], h[place] + size) for place, size in stretches.items()), diagonal, scales, loads]
 
 
 @pytest.mark.parametrize("path", RIGID, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Both without a compiler: kernels on numbers, and what they wrote on the tape; contacts open and closed.
+    """All without a compiler: kernels on numbers, what they wrote on the tape, and what routines did; contacts open
+    and closed.
 
     What steps read, all of the work space, and with what is recorded; also of what would be too long.
     """
@@ -123,9 +127,9 @@ def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPa
     space.w[y : y + model.ny] = start
     keep_independent(model, h, y, dy, space.w.copy(), space.n.copy(), kernel)
     topology = topology_of(model.arrays, h)
-    tape, whole = program(kernel, topology), program(kernel, topology, whole=True)
-    record = program(described, topology, describes=True)
-    start[model.speeds] += 0.1 * np.random.default_rng(1).normal(size=model.nv)
+    tape, whole = program_of(model.parts, topology, 200_000), program(kernel, topology, 200_000)
+    record = program(described, topology, 200_000, describes=True)
+    start[model.speeds] += np.random.default_rng(1).normal(size=model.nv)
     for closed in (0, 1):
 
         def begun(modes: int = closed) -> dict[str, np.ndarray]:
@@ -235,7 +239,7 @@ def test_equal_topologies_give_equal_code(lanes: int) -> None:
 
     def reported() -> str:
         model = tabulate(build(load_scene(TREE / "scenes/sps4/csj.toml"), {}))
-        made, builder = program(rates_kernel(model), topology_of(model.arrays, model.arrays.h)), function()
+        made, builder = program_of(model.parts, topology_of(model.arrays, model.arrays.h), 20_000), function()
         Emitter(builder, made, lambda array, place, lane: where(builder, array), lanes, exact=lanes > 1).emit()
         return str(builder.module)
 

@@ -38,6 +38,7 @@ FAMILIES = {
 CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
 #: specialised code: right-hand side as steps call it, right-hand side with all its side results, recorded quantities
 SPECIALISED, WHOLE, DESCRIBED = "specialised", "whole", "described"
+PROGRAM, BATCHED = f"{DYNAMICS}.specialise.program", (f"{DYNAMICS}.specialise", "batched")
 PRESCRIBED, RIGHT_HAND_SIDE = f"{DYNAMICS}.equations.prescribed_motion", f"{DYNAMICS}.equations.right_hand_side"
 
 
@@ -172,43 +173,66 @@ def _right_hand_side(parts: Parts) -> Composition:
     return file
 
 
-def specialised(parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False) -> str:
+def specialised(
+    parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False, routines: bool = True
+) -> str:
     """Return the source of specialised code for one topology.
 
     name: of the right-hand side as steps call it, of that with all its side results, or of the recorded quantities.
-    exact: True for the same bits as in each of several lanes.
+    exact: True for the same bits as in each of several lanes.  routines: True where these serve the mechanism, for
+    steps; else its kernels do.
     """
+    if name == SPECIALISED:
+        longest = "LONGEST" if exact else "LONGEST_STRAIGHT"
+        taken = [FILES, (PROGRAM, "llvm_text"), (PROGRAM, "NAME")]
+        return _of_topology(parts, topology, STRAIGHT, taken, longest, routines, exact=exact)
     file = _description(parts) if name == DESCRIBED else _equations(parts)
-    for taken in ("llvm_text", "NAME"):
-        file.take(f"{DYNAMICS}.specialise.program", taken)
-    options = {SPECIALISED: f"exact={exact}", WHOLE: "whole=True", DESCRIBED: "describes=True"}[name]
-    level = 3 if name == SPECIALISED else 0
-    return _of_topology(file, topology, ONE_TOPOLOGY, FILES, kernel=file.kernel, options=options, level=level)
+    for taken in ("llvm_text", "program", "NAME"):
+        file.take(PROGRAM, taken)
+    file.what += ", for one topology"
+    options = ", describes=True" if name == DESCRIBED else ""
+    function = ONE_TOPOLOGY.format(topology=_rows(topology), kernel=file.kernel, options=options)
+    return file.text(function, _formulas(parts), FILES)
 
 
-def batched(parts: Parts, topology: Topology, lanes: int) -> str:
+def batched(parts: Parts, topology: Topology, lanes: int, *, routines: bool = True) -> str:
     """Return the source of the function that advances several steppers of one topology (`compile.lanes`)."""
-    file = _equations(parts)
-    file.take(f"{DYNAMICS}.specialise", "batched")
-    file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
-    return _of_topology(file, topology, LANES, lanes=lanes)
+    taken = [CALLS, (f"{DYNAMICS}.compile.lanes", "make_lanes"), BATCHED]
+    return _of_topology(parts, topology, LANES, taken, "LONGEST", routines, lanes=lanes)
 
 
-def tangent(parts: Parts, topology: Topology) -> str:
+def tangent(parts: Parts, topology: Topology, *, routines: bool = True) -> str:
     """Return the source of the right-hand side for one topology with its tangents."""
-    file = _equations(parts)
-    file.take(f"{DYNAMICS}.specialise", "batched")
-    file.take(f"{DYNAMICS}.fields", "data")
-    change = file.take(f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
-    return _of_topology(file, topology, CHANGES, law_changes=f"{file.take(PRESCRIBED, 'make_law_changes')}({change})")
+    taken, change = [CALLS, (f"{DYNAMICS}.fields", "data"), BATCHED, (PRESCRIBED, "make_law_changes")], ""
+    if parts.harmonics:
+        taken.append((f"{DYNAMICS}.drives.oscillation", change := "change_oscillation"))
+    return _of_topology(parts, topology, CHANGES, taken, "LONGEST_DIFFERENTIATED", routines, harmonics=change)
 
 
 def _of_topology(
-    file: Composition, topology: Topology, template: str, using: tuple[str, str] = CALLS, **values: object
+    parts: Parts,
+    topology: Topology,
+    template: str,
+    taken: list[tuple[str, str]],
+    longest: str,
+    routines: bool,
+    **values: object,
 ) -> str:
-    file.what += ", for one topology"
-    function = template.format(topology="".join(f"    {row},\n" for row in topology), **values)
-    return file.text(function, _formulas(file.parts), using)
+    """Return the source of code for steps; taken: modules and names that it imports; longest: name of its limit."""
+    values["topology"], taken = _rows(topology), [*taken, (PROGRAM, longest)]
+    if not routines:
+        file = _equations(parts)
+        file.imports += [*taken[1:], (PROGRAM, "program")]
+        made = f"program({file.kernel}, TOPOLOGY, {longest})"
+        return file.text(template.format(made=made, **values), _formulas(parts), taken[0])
+    taken += [("flexclear.dynamics.effects", "Parts"), (f"{DYNAMICS}.mechanics.of_topology", "program_of")]
+    imports = "".join(f"from {module} import {name}\n" for module, name in sorted(taken))
+    made = template.format(made=f"program_of(PARTS, TOPOLOGY, {longest})", **values)
+    return f'"""Generated: right-hand side for one topology."""\n{imports}\nPARTS = {parts}\n{made}'
+
+
+def _rows(topology: Topology) -> str:
+    return "".join(f"    {row},\n" for row in topology)
 
 
 def rates(parts: Parts) -> str:
@@ -359,11 +383,15 @@ def _formulas(parts: Parts) -> str:
 # laws of time are not specialised: their pieces change with time, and their number with the scene's numbers
 ONE_TOPOLOGY = """TOPOLOGY = (
 {topology})
-files.assembles(__name__, NAME, lambda: llvm_text({kernel}, TOPOLOGY, {options}), {level})
+files.assembles(__name__, NAME, lambda: llvm_text(program({kernel}, TOPOLOGY{options}){options}), 0)
+"""
+STRAIGHT = """TOPOLOGY = (
+{topology})
+files.assembles(__name__, NAME, lambda: llvm_text({made}, exact={exact}), 3)
 """
 CHANGES = """TOPOLOGY = (
 {topology})
-law_changes, differentiated = {law_changes}, batched.differentiated(rates, TOPOLOGY)
+law_changes, differentiated = make_law_changes({harmonics}), batched.differentiated(lambda: {made})
 
 
 @calls.exported("evaluate")
@@ -378,7 +406,7 @@ def specialised(h, f, w, n, t, y, dy):
 """
 LANES = """TOPOLOGY = (
 {topology})
-run = make_lanes(*batched.batched(rates, TOPOLOGY, {lanes}), {lanes})
+run = make_lanes(*batched.batched(lambda: {made}, {lanes}), {lanes})
 
 
 @calls.exported("lanes")

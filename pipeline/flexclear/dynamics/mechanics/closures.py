@@ -74,10 +74,16 @@ def spread(
     for s, gain in zip(step.S, gains, strict=True):
         V.append([gain.root * wrench.on(s) for wrench in wrenches])
         wrenches = [wrench - gain.K * v for wrench, v in zip(wrenches, V[-1], strict=True)]
+    return V, *less(V, forces, gamma, S), inwards(step, wrenches) if carried_on else []
+
+
+def less(V: Rows, forces: Numbers, gamma: Numbers, S: Rows) -> tuple[Numbers, Rows]:
+    """Return gamma - V^T forces, and S + V^T V, up to the diagonal."""
     columns = list(zip(*V, strict=True))
     gamma = [one - _dot(column, forces) for one, column in zip(gamma, columns, strict=True)]
-    S = [[s + _dot(a, b) for s, b in zip(row, columns, strict=False)] for row, a in zip(S, columns, strict=True)]
-    return V, gamma, S, inwards(step, wrenches) if carried_on else []
+    return gamma, [
+        [s + _dot(a, b) for s, b in zip(row, columns, strict=False)] for row, a in zip(S, columns, strict=True)
+    ]
 
 
 @routine
@@ -104,6 +110,12 @@ def coupled(S: Rows, V: Rows, W: Rows) -> Rows:
 def with_multipliers(forces: Numbers, V: Rows, multipliers: Numbers) -> list[Any]:
     """Return forces + V multipliers."""
     return [f + _dot(v, multipliers) for f, v in zip(forces, V, strict=True)]
+
+
+@routine
+def opposite(right: Numbers) -> list[Any]:
+    """Return -right."""
+    return [-one for one in right]
 
 
 @routine

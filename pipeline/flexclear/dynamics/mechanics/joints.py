@@ -28,10 +28,11 @@ class Relative(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A joint type. motion: Relative of positions and speeds.  rate: of the positions."""
+    """A joint type. motion: Relative of positions and speeds.  rate: of the positions, more by `redundant`."""
 
     motion: Callable[[Any, Any], Relative]
     rate: Callable[[Any, Any], Any] = lambda x, u: u
+    redundant: int = 0
 
 
 def about_z(angle: Any) -> Matrix:
@@ -99,16 +100,23 @@ def by_rotation_vector(x: Any, u: Any) -> Relative:
     Source: Bauchau (2011), Flexible Multibody Dynamics, sec. 13.3.
     """
     x, u = Vector(x), Vector(u)
-    X, s, ds = skew(x), dot(x, x), 2.0 * dot(x, u)
-    c, a, b, da, db = branch(s < SERIES_ANGLE, lambda: _series(s), lambda: _closed(s))
-    T, xu = UNIT + a * X + b * (X @ X), cross(x, u)
+    s = dot(x, x)
+    R_FG, T, bias = rotation(x, u, branch(s < SERIES_ANGLE, lambda: series(s), lambda: _closed(s)))
+    return Relative(R_FG, ZERO, [Twist(T.column(k), ZERO) for k in range(3)], Twist(bias, ZERO))
+
+
+def rotation(x: Vector, u: Vector, coefficients: Sequence[Any]) -> tuple[Matrix, Matrix, Vector]:
+    """Return the rotation by a vector x of rate u, T with omega = T u, and the rate of omega at constant u.
+
+    coefficients: at the squared angle, see `series`.
+    """
+    X, ds, xu = skew(x), 2.0 * dot(x, u), cross(x, u)
+    c, a, b, da, db = coefficients
     bias = da * ds * xu + db * ds * cross(x, xu) + b * cross(u, xu)
-    S = [Twist(T.column(k), ZERO) for k in range(3)]
-    return Relative(UNIT + c * X + a * (X @ X), ZERO, S, Twist(bias, ZERO))
+    return UNIT + c * X + a * (X @ X), UNIT + a * X + b * (X @ X), bias
 
 
 def _closed(s: Any) -> tuple[Any, ...]:
-    """Return sin/angle, a = (1 - cos)/angle^2, b = (angle - sin)/angle^3 and the rates of a and b by s = angle^2."""
     angle = sqrt(s)
     c, half = sin(angle) / angle, sin(0.5 * angle)
     a = 2.0 * half * half / s
@@ -116,9 +124,13 @@ def _closed(s: Any) -> tuple[Any, ...]:
     return c, a, b, (0.5 * c - a) / s, (0.5 * a - 1.5 * b) / s
 
 
-def _series(s: Any) -> tuple[Any, ...]:
-    c = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)))
-    a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0))))
+def series(s: Any) -> tuple[Any, ...]:
+    """Return sin/angle, a = (1 - cos)/angle^2, b = (angle - sin)/angle^3 and the rates of a and b by s = angle^2.
+
+    They are exact below about one radian.
+    """
+    c = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
+    a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
     b = (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))) / 6.0
     da = -(1.0 - s / 15.0 * (1.0 - s * 3.0 / 112.0 * (1.0 - s * 2.0 / 135.0))) / 24.0
     db = -(1.0 - s / 21.0 * (1.0 - s / 48.0 * (1.0 - s * 2.0 / 165.0))) / 120.0
@@ -133,7 +145,7 @@ JOINTS = {
     "slot": Joint(along(0, TURN)),
     "planar": Joint(along(0, 1, TURN)),
     "universal": Joint(by_two_turns),
-    "spherical": Joint(by_quaternion, quaternion_rate),
+    "spherical": Joint(by_quaternion, quaternion_rate, 1),
     "rotation-vector": Joint(by_rotation_vector),
-    "free": Joint(freely, lambda x, u: [*quaternion_rate(x[:4], u[:3]), *u[3:]]),
+    "free": Joint(freely, lambda x, u: [*quaternion_rate(x[:4], u[:3]), *u[3:]], 1),
 }

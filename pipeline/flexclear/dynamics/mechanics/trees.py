@@ -1,4 +1,4 @@
-r"""Trees of rigid bodies: motion from the ground outwards, elimination from the leaves inwards, accelerations outwards.
+r"""Trees of bodies: motion from the ground outwards, elimination from the leaves inwards, accelerations outwards.
 
 From the leaves to the ground, each body has the inertia I with which it resists while all bodies beyond it move freely,
 and needs the wrench F. Each coordinate of its joint, whose motion is s, is eliminated from them:
@@ -19,7 +19,9 @@ from typing import Any, NamedTuple
 
 from flexclear.dynamics.mechanics.joints import JOINTS
 from flexclear.dynamics.mechanics.vectors import (
+    AT_REST,
     UNIT,
+    WITHOUT,
     ZERO,
     Inertia,
     Matrix,
@@ -56,23 +58,34 @@ class Motion(NamedTuple):
 
 
 class Site(NamedTuple):
-    """A frame S on a body."""
+    """A frame S on a body, in axes of that.
+
+    velocity, acceleration: of S in the body as modes deform it; the latter without the part from their accelerations.
+    """
 
     p_BS: Vector
     R_BS: Matrix
+    velocity: Twist = AT_REST
+    acceleration: Twist = AT_REST
+
+
+class Bounds(NamedTuple):
+    """Mass of a body and all beyond [kg], and a bound of their polar moment about its origin [kg m^2]."""
+
+    borne: Any
+    reaching: Any
+
+
+#: where something acts: motion of a body, and a site on it
+End = tuple[Motion, Site]
 
 
 class Body(NamedTuple):
-    """A rigid body. com [m], J: inertia about it [kg m^2], axes of the body.
-
-    borne, reaching: mass of the body and all beyond [kg], and a bound of their polar moment about its origin [kg m^2].
-    """
+    """A rigid body. com [m], J: inertia about it [kg m^2], axes of the body."""
 
     mass: Any
     com: Vector
     J: Symmetric
-    borne: Any
-    reaching: Any
 
 
 class Coordinates(NamedTuple):
@@ -107,15 +120,49 @@ class Resistance(NamedTuple):
     F: Wrench
 
 
+#: motion of a frame about the origin of its body, per rate of each shape of that; none on a rigid body
+Columns = Sequence[Twist]
+#: what acts on a body through a frame, about the origin of the body
+Beyond = tuple[Resistance, Columns]
+
+
 def carried(body: Motion, site: Site) -> Motion:
     """Return the motion of a site on a body."""
-    p_BS = body.R_WB @ site.p_BS
+    R, p_BS = body.R_WB, body.R_WB @ site.p_BS
+    deforming, speeding = site.velocity.seen(R), site.acceleration.seen(R)
     swing = cross(body.omega, p_BS)
-    a = body.a + cross(body.alpha, p_BS) + cross(body.omega, swing)
-    return Motion(body.R_WB @ site.R_BS, body.p_WB + p_BS, body.omega, body.v + swing, body.alpha, a)
+    v = body.v + swing + deforming.linear
+    alpha = body.alpha + cross(body.omega, deforming.angular) + speeding.angular
+    a = body.a + cross(body.alpha, p_BS) + cross(body.omega, swing + 2.0 * deforming.linear) + speeding.linear
+    return Motion(R @ site.R_BS, body.p_WB + p_BS, body.omega + deforming.angular, v, alpha, a)
+
+
+def carrying(frame: Motion, site: Site) -> Motion:
+    """Return the motion of a body from that of a site on it: the reverse of `carried`."""
+    R = frame.R_WB @ site.R_BS.T
+    p_BS, deforming, speeding = R @ site.p_BS, site.velocity.seen(R), site.acceleration.seen(R)
+    omega = frame.omega - deforming.angular
+    alpha = frame.alpha - speeding.angular - cross(omega, deforming.angular)
+    swing = cross(omega, p_BS)
+    a = frame.a - cross(alpha, p_BS) - cross(omega, swing + 2.0 * deforming.linear) - speeding.linear
+    return Motion(R, frame.p_WB - p_BS, omega, frame.v - swing - deforming.linear, alpha, a)
 
 
 on_body = routine(carried)
+
+
+def moving(frame: Motion, p: Vector) -> Vector:
+    """Return the velocity of the point of a frame's body which is at p in the world."""
+    return frame.v + cross(frame.omega, p - frame.p_WB)
+
+
+def on_both(ends: Sequence[End], B: Motion, wrench: Wrench) -> tuple[Wrench, Wrench]:
+    """Return the opposite of a wrench on the first of two bodies, and that on the second one, about their origins.
+
+    wrench: about the site on the second one, whose motion is B.
+    """
+    a, b = ends
+    return (wrench * -1.0).about(B.p_WB - a[0].p_WB), wrench.about(b[0].R_WB @ b[1].p_BS)
 
 
 @routine
@@ -141,10 +188,16 @@ def place(kind: str, parent: Motion, site: Site, coordinates: Coordinates) -> tu
     return body, Step(S, parent.R_WB @ site.p_BS + p_FG)
 
 
-def resistance(motion: Motion, body: Body, beyond: Sequence[Resistance]) -> Resistance:
+@routine
+def pushed(wrench: Wrench) -> Resistance:
+    """Return a wrench on a body as what it resists: a wrench without inertia, which the body need not be given."""
+    return Resistance(WITHOUT, wrench * -1.0)
+
+
+def resistance(motion: Motion, body: Body, beyond: Sequence[Beyond]) -> Resistance:
     """Return the inertia of a body about its origin, and the wrench that its known acceleration needs.
 
-    beyond: about the same point, of the bodies that it carries, which move freely.
+    beyond: of the bodies that it carries, which move freely, and of wrenches on it.
     """
     c, m, w = motion.R_WB @ body.com, body.mass, motion.omega
     about_com = (motion.R_WB @ body.J @ motion.R_WB.T).symmetric
@@ -153,7 +206,7 @@ def resistance(motion: Motion, body: Body, beyond: Sequence[Resistance]) -> Resi
     a = motion.a + cross(motion.alpha, c) + cross(w, cross(w, c))
     spin = about_com @ motion.alpha + cross(w, about_com @ w)
     F = Wrench(spin, m * a).about(c)
-    for one in beyond:
+    for one, _ in beyond:
         I, F = I + one.I, F + one.F
     return Resistance(I, F)
 
@@ -162,25 +215,40 @@ resist = routine(resistance)
 
 
 @routine
-def eliminate(carried_on: int, motion: Motion, body: Body, step: Step, beyond: Sequence[Resistance], sound: Any) -> Any:
-    """Eliminate the coordinates of a body's joint from the resistance of the body and all beyond.
+def eliminate(
+    carried_on: int, motion: Motion, body: Body, bounds: Bounds, step: Step, beyond: Sequence[Beyond], sound: Any
+) -> Any:
+    """Eliminate the coordinates of a rigid body's joint from the resistance of the body and all beyond."""
+    return without_coordinates(carried_on, resistance(motion, body, beyond), bounds, step, sound)
+
+
+def without_coordinates(carried_on: int, rest: Resistance, bounds: Bounds, step: Step, sound: Any) -> Any:
+    """Eliminate the coordinates of a body's joint from the resistance of the body with all beyond.
 
     Returns what remains for the body that carries it, about that one's origin, if `carried_on` is 1; the coordinates'
     gains; L^-1 of the forces along them; and `sound`, which becomes 0 when a coordinate moves no mass.
     """
-    I, F = resistance(motion, body, beyond)
-    gains, forces = [], []
+    (I, F), gains, forces = rest, list[Gain](), list[Any]()
     for s in step.S:
         g = I.of(s)
-        D, rest = g.on(s), -F.on(s)
-        least = MASSLESS * (body.reaching * dot(s.angular, s.angular) + body.borne * dot(s.linear, s.linear))
+        D, needed = g.on(s), F.on(s)
+        least = MASSLESS * (bounds.reaching * dot(s.angular, s.angular) + bounds.borne * dot(s.linear, s.linear))
         sound = select(least < D, sound, 0.0)  # also if D is not a number
         inverse = 1.0 / D
         root = sqrt(inverse)
         gains.append(Gain(root, g * root))
-        forces.append(root * rest)
-        I, F = I.without(g, inverse), F + g * (inverse * rest)
+        forces.append(-root * needed)
+        I, F = I.without(g, inverse), F - g * (inverse * needed)
     return carried_at(step, Resistance(I, F)) if carried_on else None, gains, forces, sound
+
+
+free_joint = routine(without_coordinates)
+
+
+@routine
+def added(one: Any, other: Any) -> Any:
+    """Return the sum of two wrenches or numbers."""
+    return one + other
 
 
 def carried_at(step: Step, rest: Resistance) -> Resistance:

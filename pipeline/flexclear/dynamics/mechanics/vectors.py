@@ -174,6 +174,10 @@ class Inertia(NamedTuple):
         return Inertia(self.A + (a @ self.B.T).symmetric + (B @ a.T).symmetric, B, self.C)
 
 
+#: the inertia of nothing
+WITHOUT = Inertia(Symmetric([0.0] * 6), Matrix([0.0] * 9), Symmetric([0.0] * 6))
+
+
 def total(twists: Iterable[Twist], factors: Iterable[Any]) -> Twist:
     """Return the sum of twists, each times its factor."""
     return sum((twist * factor for twist, factor in zip(twists, factors, strict=True)), AT_REST)

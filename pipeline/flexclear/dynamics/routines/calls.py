@@ -17,14 +17,15 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.code import Program
-from flexclear.dynamics.specialise.tape import FLOAT, Branch, Symbol
+from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, Branch, Loop, Symbol
 
-#: numbers of the scene, the state, its rates, the work space of the engine, and the results of the list's own calls
-SCENE, STATE, RATES, WORK, RESULTS = ARRAYS = "f", "y", "dy", "w", "v"
+#: numbers of the scene, the state, its rates, the work space of the engine, the results of the list's own calls, and
+#: the modes of the contacts, which are integers
+SCENE, STATE, RATES, WORK, RESULTS, MODES = ARRAYS = "f", "y", "dy", "w", "v", "modes"
 
 
 class Cell:
@@ -71,6 +72,16 @@ class Call(NamedTuple):
 _building: ContextVar[CallList | None] = ContextVar("building", default=None)
 
 
+@contextmanager
+def inline() -> Iterator[None]:
+    """Let routines be parts of what calls them during the context."""
+    token = _building.set(None)
+    try:
+        yield
+    finally:
+        _building.reset(token)
+
+
 def routine(function: Callable) -> Callable:
     """Make a function a routine."""
 
@@ -86,9 +97,10 @@ def routine(function: Callable) -> Callable:
 class CallList:
     """A list of calls under construction.
 
-    size: number of results in memory; the first one is kept free, for what the list reports.
+    size: number of results in memory; the first one is kept free, for what the list reports, as a `number`.
     """
 
+    number: ClassVar[type] = float
     calls: list[Call] = field(default_factory=list)
     size: int = 1
     _kinds: dict[Any, _Kind] = field(default_factory=dict)
@@ -179,13 +191,14 @@ def _traced(
     function: Callable, arguments: Any, inside: list[Any], into: Sequence[Argument] | None, runs: tuple[str, ...]
 ) -> _Kind:
     """Trace a routine; inside: its numbers, symbolic ones by their run."""
-    tape, token = new_tape(), _building.set(None)
-    try:
-        symbols = [tape.write(FLOAT, "load", a.run, a.offset) if isinstance(a, Argument) else a for a in inside]
+    tape = new_tape()
+    symbols = [
+        tape.write(INTEGER if runs[int(a.run)] == MODES else FLOAT, "load", *a) if isinstance(a, Argument) else a
+        for a in inside
+    ]
+    with inline():
         result = function(*rebuilt(arguments, iter(symbols)))
-    finally:
-        _building.reset(token)
-    first, rest = ((), result) if into is None else (result[0], result[1] if len(result) == 2 else result[1:])
+    first, rest = parted(result, into)
     stores = [(one.run, one.offset, value) for one, value in zip(into or (), leaves(first), strict=True)]
     given = {id(one): k for k, one in enumerate(symbols) if isinstance(one, Symbol)}
     places, slots = list[tuple[str, Any]](), dict[Symbol, int]()
@@ -199,6 +212,13 @@ def _traced(
     stores += [(str(len(runs)), slot, value) for value, slot in slots.items()]
     code = Code(function.__name__.lstrip("_"), Program(tape.block, stores), (*runs, RESULTS))
     return _Kind(code, rest, places, len(slots))
+
+
+def parted(result: Any, into: Sequence[Any] | None) -> tuple[Any, Any]:
+    """Return what is stored in given places, the first of several results, if there are such places, and the others."""
+    if into is None:
+        return (), result
+    return result[0], result[1] if len(result) == 2 else result[1:]
 
 
 def _shape(tree: Any) -> Any:
@@ -225,6 +245,14 @@ def _described(program: Program) -> Iterator[Any]:
                 for joined, *both in item.joins:
                     numbers[joined] = len(numbers)
                     yield "join", joined.kind, *map(name, both)
+            elif isinstance(item, Loop):
+                yield "loop", *(name(one.first) for one in item.carried)
+                for one in item.carried:
+                    numbers[one.inside] = len(numbers)
+                yield from block(item.blocks[0])
+                yield "left", name(item.condition), *(name(one.left) for one in item.carried)
+                for one in item.carried:
+                    numbers[one.after] = len(numbers)
             else:
                 numbers[item] = len(numbers)
                 yield item.kind, item.operation, *map(name, item.arguments)

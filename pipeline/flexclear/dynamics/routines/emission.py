@@ -12,14 +12,16 @@ from typing import Any
 from llvmlite import ir
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.routines.calls import ARRAYS, Code
+from flexclear.dynamics.routines.calls import ARRAYS, MODES, Code
 from flexclear.dynamics.specialise.code import Emitter
 
 #: name of the function in each text
 NAME = "routine"
 _WORD, _OFFSET, _FLOAT = ir.IntType(64), ir.IntType(32), ir.DoubleType()
 #: of routines: the arrays, and the offsets of the call's runs
-_ROUTINE = ir.FunctionType(ir.VoidType(), [*[_FLOAT.as_pointer()] * len(ARRAYS), _OFFSET.as_pointer()])
+_ROUTINE = ir.FunctionType(
+    ir.VoidType(), [*((_WORD if array == MODES else _FLOAT).as_pointer() for array in ARRAYS), _OFFSET.as_pointer()]
+)
 _EVALUATE = ir.FunctionType(
     _WORD,
     [*(kind.as_pointer() for kind in (_WORD, _FLOAT, _FLOAT, _WORD)), _FLOAT, _WORD, _WORD],
@@ -49,7 +51,7 @@ def interpreter_text() -> str:
     count, codes, offsets, results = (_read(builder, head, k) for k in range(4))
     codes, offsets = (builder.inttoptr(one, _WORD.as_pointer()) for one in (codes, offsets))
     results = builder.inttoptr(results, _FLOAT.as_pointer())
-    given = [f, builder.gep(w, [y]), builder.gep(w, [dy]), w, results]
+    given = [f, builder.gep(w, [y]), builder.gep(w, [dy]), w, results, builder.gep(n, [_read(builder, n, m.MODE)])]
     before, loop, after = builder.block, builder.append_basic_block(), builder.append_basic_block()
     builder.branch(loop)
     builder.position_at_end(loop)

@@ -21,18 +21,23 @@ from flexclear.dynamics.compile import functions
 from flexclear.dynamics.compile.folder import writable
 from flexclear.dynamics.routines.calls import CallList
 from flexclear.dynamics.routines.emission import interpreter_text, routine_text
+from flexclear.dynamics.specialise import topology as topologies
 from flexclear.workflow.fingerprint import TREE, library_version, sources_of
 
 #: what makes lists and their code
-MAKERS = tuple(f"flexclear.dynamics.{name}" for name in ("mechanics", "memory", "routines", "specialise"))
+MAKERS = tuple(
+    f"flexclear.dynamics.{name}"
+    for name in ("mechanics", "memory", "routines", "specialise", "contact", "loads", "vectors")
+)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedList:
     """A list of calls as the interpreter reads it.
 
-    interpreter: its address.  codes: address per call.  offsets: of the runs of all calls.  begins: per call, the index
-    of its first one.  size: number of results.
+    interpreter: its address.  codes: address per call.  offsets: of the runs of all calls, in their stretches of f and
+    w where they have some (`specialise.topology`).  begins: per call, the index of its first one.  size: number of
+    results.
     """
 
     interpreter: int
@@ -41,9 +46,9 @@ class LoadedList:
     begins: np.ndarray
     size: int
 
-    def instance(self) -> ListInstance:
-        """Return the list with results of its own."""
-        return ListInstance(self)
+    def instance(self, h: np.ndarray) -> ListInstance:
+        """Return the list with results of its own; h: with the starts of its stretches in f and w."""
+        return ListInstance(self, h)
 
 
 #: lists of this process, by their files
@@ -53,9 +58,11 @@ loaded: dict[Path, LoadedList] = {}
 class ListInstance:
     """A list of calls with its results, for one engine. words: what the interpreter reads (`routines.emission`)."""
 
-    def __init__(self, loaded: LoadedList) -> None:
+    def __init__(self, loaded: LoadedList, h: np.ndarray) -> None:
         self.loaded, self.results = loaded, np.zeros(loaded.size)
-        self._starts = (loaded.offsets.ctypes.data + loaded.offsets.itemsize * loaded.begins).astype(np.int64)
+        stretch, inside = topologies.split(loaded.offsets)
+        self._offsets = (np.where(stretch >= 0, h[stretch], 0) + inside).astype(np.int32)
+        self._starts = (self._offsets.ctypes.data + self._offsets.itemsize * loaded.begins).astype(np.int64)
         tables = (loaded.codes, self._starts, self.results)
         self.words = np.array([len(loaded.codes), *(table.ctypes.data for table in tables)], dtype=np.int64)
 
@@ -100,7 +107,7 @@ def _table(calls: CallList) -> dict[str, list]:
 def _loaded(table: dict[str, list], at: dict[str, int]) -> LoadedList:
     addresses = np.array([at[name] for name in table["names"]], dtype=np.int64)
     begins = np.cumsum([0, *table["counts"]])[:-1]
-    offsets = np.array(table["offsets"], dtype=np.int32)
+    offsets = np.array(table["offsets"], dtype=np.int64)
     return LoadedList(int(addresses[0]), addresses[table["codes"]], offsets, begins, table["size"][0])
 
 

@@ -11,7 +11,8 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from flexclear.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape
+from flexclear.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape
+from flexclear.dynamics.specialise.trace import Trace
 
 
 class UndecidableError(TypeError):
@@ -26,21 +27,27 @@ def _undecidable(condition: Symbol) -> bool:
     )
 
 
-def new_tape() -> Tape:
-    """Return an empty tape without limit of length."""
-    return Tape(_undecidable, sys.maxsize)
+def new_tape(longest: int = sys.maxsize) -> Tape:
+    """Return an empty tape; longest: most operations."""
+    return Tape(_undecidable, longest)
 
 
-def _function(name: str) -> Callable[[Any], Any]:
-    plain = getattr(math, name)
-
-    def apply(a: Any) -> Any:
-        return a.tape.write(FLOAT, name, a) if isinstance(a, Symbol) else plain(a)
+def _function(name: str, plain: Callable) -> Callable[..., Any]:
+    def apply(*arguments: Any) -> Any:
+        one = next((a for a in arguments if isinstance(a, Symbol)), None)
+        return plain(*arguments) if one is None else one.tape.write(FLOAT, name, *arguments)
 
     return apply
 
 
-sqrt, sin, cos = map(_function, ("sqrt", "sin", "cos"))
+sqrt, sin, cos, tan, exp, log, tanh = (
+    _function(name, getattr(math, name)) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")
+)
+arctan2, nearest, copysign = (
+    _function("arctan2", math.atan2),
+    _function("round", round),
+    _function("copysign", math.copysign),
+)
 
 
 def select(condition: Any, a: Any, b: Any) -> Any:
@@ -58,6 +65,23 @@ def smaller(a: Any, b: Any) -> Any:
     return select(b < a, b, a)
 
 
+def shared(kernel: Callable) -> Callable:
+    """Return a function that kernels use, too, for numbers that may be symbols: its conditions become branches."""
+
+    def called(*arguments: Any) -> Any:
+        symbol = next((one for one in leaves(arguments) if isinstance(one, Symbol)), None)
+        if symbol is None:
+            return kernel(*arguments)
+        trace, tape = Trace(tape=symbol.tape), symbol.tape
+        refuse, tape.decide = tape.decide, trace.decide
+        try:
+            return trace.plain(kernel)(*arguments)
+        finally:
+            tape.decide = refuse
+
+    return called
+
+
 def branch(condition: Any, first: Callable[[], Any], second: Callable[[], Any]) -> Any:
     """Return first() where the condition holds, else second(): nested tuples of numbers of the same shape."""
     if not isinstance(condition, Symbol):
@@ -69,6 +93,25 @@ def branch(condition: Any, first: Callable[[], Any], second: Callable[[], Any]) 
     tape.block.append(made)
     a, b = map(leaves, ways)
     return rebuilt(ways[0], iter([tape.join(made, *both) for both in zip(a, b, strict=True)]))
+
+
+def repeat(turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
+    """Return the state, nested tuples of numbers, after turn(state) -> (condition, state) as long as that holds."""
+    symbol = next((one for one in leaves(state) if isinstance(one, Symbol)), None)
+    if symbol is None:
+        going = True
+        while going:
+            going, state = turn(state)
+        return state
+    tape = symbol.tape
+    carried = [tape.carry(first) for first in leaves(state)]
+    made = Loop(([],), carried)
+    with tape.inside(made.blocks[0]):
+        made.condition, after = turn(rebuilt(state, iter([one.inside for one in carried])))
+    for one, left in zip(carried, leaves(after), strict=True):
+        one.left = left
+    tape.block.append(made)
+    return rebuilt(state, iter([one.after for one in carried]))
 
 
 def leaves(tree: Any) -> list[Any]:

@@ -15,14 +15,15 @@ from flexclear.dynamics.kernels import Kernel
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.dynamics.specialise.derivative import tangent
-from flexclear.dynamics.specialise.program import LONGEST_DIFFERENTIATED, places, program
+from flexclear.dynamics.specialise.program import LONGEST_DIFFERENTIATED, places
 
 _INTEGER = ir.IntType(64)
 
 
-def differentiated(rates: Callable, topology: topologies.Topology) -> Any:
+def differentiated(made: Callable[[], Program]) -> Any:
     """Return run(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code with its tangent.
 
+    made: makes the program.
     f0, w0: offsets in f and w of the changes of the numbers, and of those of laws, impact rates and contacts.
     change, rates_change: indices in w of the changes of the state and of its rates.
     """
@@ -32,25 +33,23 @@ def differentiated(rates: Callable, topology: topologies.Topology) -> Any:
         typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any, f0: Any, w0: Any, change: Any, rates: Any
     ) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            plain = program(kernel, topology, longest=LONGEST_DIFFERENTIATED)
-            tape = tangent(plain, LONGEST_DIFFERENTIATED)
+            tape = tangent(made(), LONGEST_DIFFERENTIATED)
             Emitter(builder, tape, places(builder, tape, [values])).emit()
             return context.get_dummy_value()
 
         return types.void(h, f, w, n, y, dy, f0, w0, change, rates), generate
 
-    kernel = rates
     return run
 
 
-def batched(rates: Callable, topology: topologies.Topology, lanes: int) -> tuple[Any, Any]:
+def batched(made: Callable[[], Program], lanes: int) -> tuple[Any, Any]:
     """Build compiled functions note(h, f, numbers, lane) and run(addresses, numbers).
 
     `run` evaluates several states, each of a mechanism with its own numbers, which `note` has copied to
-    adjacent positions: `numbers` has room for all of f in all lanes.
+    adjacent positions: `numbers` has room for all of f in all lanes.  made: makes the program.
     addresses: of all h, then of all f, w and n, then all indices of y and dy, shape (6 lanes,).
     """
-    traced = cache(lambda: program(rates, topology))  # both functions are typed and written, and the tape is long
+    traced = cache(made)  # both functions are typed and written, and the tape is long
 
     @intrinsic
     def note(typingctx: Any, h: Any, f: Any, numbers: Any, lane: Any) -> Any:

@@ -1,9 +1,9 @@
 """Right-hand side of one topology as specialised code: no tables, no loops, only registers and the stack as storage.
 
-Each topology has two versions. The steps call the one that stores in w only the values that they read (`KEPT`): the
-state's rates, the contacts' results, residuals of the loops and the independence of their rows; n[ABRIDGED] reports
-that. LLVM optimises this version. The other one stores all results of an evaluation. It is called some hundreds of
-times in a run, and LLVM assembles it without optimisation, in a tenth of the time.
+Each topology has two versions. The steps call straight code of routines (`mechanics.of_topology`), which stores only
+what they read (`mechanics.evaluation.evaluated`); n[ABRIDGED] reports that. LLVM optimises this version. The other one
+is that of kernels and stores all results of an evaluation. It is called some hundreds of times in a run, and LLVM
+assembles it without optimisation, in a tenth of the time.
 """
 
 from __future__ import annotations
@@ -20,11 +20,8 @@ from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, same
 from flexclear.dynamics.specialise.trace import Memory, Trace
 
 #: operations beyond which specialised code takes longer to build than kernels and is hardly faster: it no longer fits
-#: the processor's first caches; and the limit for tangents, for which kernels are no alternative
-LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
-#: arrays of w that the steps read after an evaluation; for ROW_SCALE and SCHUR see `_kept`
-KEPT = {m.TOUCH.at, m.LOAD_BENDS.at, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, topologies.RATES}
-KEPT |= {m.NAMED[watched].at for watched in ("bends", "bearing")}
+#: the processor's first caches; beyond which lists of calls are faster; and the limit for tangents, which have no list
+LONGEST, LONGEST_STRAIGHT, LONGEST_DIFFERENTIATED = 50_000, 20_000, 80_000
 #: integers of n that are stored
 REPORTS = {m.EVALUATION, m.ABRIDGED}
 _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
@@ -32,13 +29,11 @@ _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
 NAME = "specialised"
 
 
-def program(
-    kernel: Callable, topology: topologies.Topology, *, whole: bool = False, describes: bool = False, longest: int = 0
-) -> Program:
-    """Return the program of kernel rates(h, f, w, n, y, dy) for a topology; raise UnsuitedError when it is too long.
+def program(kernel: Callable, topology: topologies.Topology, longest: int = 0, *, describes: bool = False) -> Program:
+    """Return the program of kernel rates(h, f, w, n, y, dy) for a topology, which stores all of w.
 
-    whole: True to store all of w, else only values that steps read.  describes: the kernel is describe(h, f, w, n), for
-    an evaluated state; all is stored.  longest: most operations; `LONGEST` when 0.
+    describes: the kernel is describe(h, f, w, n), for an evaluated state.  Raises UnsuitedError when it has more than
+    `longest` operations, or `LONGEST` for 0.
     """
     h, trace = topologies.header(topology), Trace(longest or LONGEST)
     w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
@@ -47,45 +42,18 @@ def program(
     trace.plain(kernel)(
         h, f, w, n, *(() if describes else (topologies.start(topologies.STATE), topologies.start(topologies.RATES)))
     )
-    if describes or whole:
-        changed = {index: v for index, v in w.values.items() if index not in ground or not same(v, ground[index])}
-        return Program(trace.tape.block, [*_stores("w", changed), *_stores("n", n.values, REPORTS.__contains__)])
-    kept = _kept(h)
-    stores = _stores("w", w.values, lambda index: kept(*topologies.split(index)))
-    return Program(trace.tape.block, [*stores, ("n", m.EVALUATION, n.values[m.EVALUATION]), ("n", m.ABRIDGED, 1)])
+    changed = [(index, v) for index, v in w.values.items() if index not in ground or not same(v, ground[index])]
+    reports = [("n", index, v) for index, v in n.values.items() if index in REPORTS]
+    return Program(trace.tape.block, [*(("w", *one) for one in changed), *reports])
 
 
-def _stores(array: str, values: dict[int, Any], kept: Callable[[int], bool] = lambda _: True) -> list[Any]:
-    return [(array, index, value) for index, value in values.items() if kept(index)]
-
-
-def _kept(h: list[int]) -> Callable[[int, int], bool]:
-    """Return the test whether an index is read after an evaluation: of the factor of J M^-1 J^T only its diagonal."""
-    o = h[m.CLOSURE_ENVELOPE.at]
-    diagonal = {h[o + m.CLOSURE_ENVELOPE.size * r + m.CLOSURE_ENVELOPE.origin] + r for r in range(h[m.N_KEPT_ROWS])}
-
-    def kept(stretch: int, index: int) -> bool:
-        scale = stretch == m.ROW_SCALE and index >= h[m.N_CLOSURE_ROWS]
-        return stretch in KEPT or scale or (stretch == m.SCHUR and index in diagonal)
-
-    return kept
-
-
-def llvm_text(
-    kernel: Callable,
-    topology: topologies.Topology,
-    *,
-    whole: bool = False,
-    exact: bool = False,
-    describes: bool = False,
-) -> str:
-    """Return the LLVM text of a C function that does a kernel's work for a topology.
+def llvm_text(tape: Program, *, exact: bool = False, describes: bool = False) -> str:
+    """Return the LLVM text of a C function that runs a program.
 
     It is evaluate(h, f, w, n, t, y, dy), which first evaluates the laws at time t, or, to describe, describe(h, f, w,
-    n).  whole, describes: see `program`.  exact: True for the results of each lane of `batched`, bit by bit; sums in
-    any order are faster by a sixth.
+    n).  exact: True for the results of each lane of `batched`, bit by bit; sums in any order are faster by a sixth.
     """
-    tape, module = program(kernel, topology, whole=whole, describes=describes), ir.Module(NAME)
+    module = ir.Module(NAME)
     tables = [_INTEGER.as_pointer(), _FLOAT.as_pointer(), _FLOAT.as_pointer(), _INTEGER.as_pointer()]
     more = [] if describes else [_FLOAT, _INTEGER, _INTEGER]
     function = ir.Function(module, ir.FunctionType(_INTEGER, [*tables, *more]), NAME)

@@ -28,7 +28,7 @@ STATE, RATES, STATE_CHANGE, RATES_CHANGE = range(m.HEADER + 1, m.HEADER + 5)
 def topology_of(arrays: Arrays, h: np.ndarray) -> Topology:
     """Return the topology in h, with the closure rows that its selection keeps."""
     sizes = h[:SIZES].copy()
-    sizes[[m.N_LAWS, m.N_GROUPS, m.N_BODIES, m.N_FRAMES, m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = 0
+    sizes[[m.N_GROUPS, m.N_BODIES, m.N_FRAMES, m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = 0
     sizes[m.NY] = sizes[m.NQ] + sizes[m.NV] + sizes[m.N_LEDGER]  # without changes
     tables = []
     for table in m.TABLES["h"]:
@@ -48,8 +48,11 @@ def header(topology: Topology) -> list[int]:
     return h
 
 
-def split(index: int) -> tuple[int, int]:
-    """Return the header index of a work array, -1 for h, f, w or n itself, and the position in the array."""
+def split(index: Any) -> tuple[Any, Any]:
+    """Return the header index of a work array, -1 for h, f, w or n itself, and the position in the array.
+
+    index: an integer or an array of such.
+    """
     return (index >> STRETCH) - 1, index & ((1 << STRETCH) - 1)
 
 

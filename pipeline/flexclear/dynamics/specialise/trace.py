@@ -62,10 +62,10 @@ class Run:
 
 
 class Trace:
-    """Records a tape; `journal` lists stores in their order."""
+    """Records a tape, a new one of limited length by default; `journal` lists stores in their order."""
 
-    def __init__(self, longest: int) -> None:
-        self.tape = Tape(self.decide, longest)
+    def __init__(self, longest: int = 0, tape: Tape | None = None) -> None:
+        self.tape = tape or Tape(self.decide, longest)
         self.journal: list[Any] = []
         self.runs = [Run([], [])]
         self.plain = Plain(self._function, self._largest, self._smallest, self.call)

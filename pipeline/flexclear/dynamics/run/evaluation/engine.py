@@ -35,7 +35,7 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
 )
 from flexclear.scene.loads import SampledPid
 from flexclear.system.errors import InputError, SolverError, refuse
-from flexclear.system.progress import Progress
+from flexclear.system.progress import Progress, silent
 
 #: of effects: why a run stopped, in words
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
@@ -73,12 +73,6 @@ class Engine:
     def has_specialised_code(self) -> bool:
         """True when evaluations use code specialised for the topology."""
         return "evaluate" not in self.entry.addresses
-
-    @property
-    def has_routines(self) -> bool:
-        """True when steps run a list of calls: of a mechanism of known routines without specialised code."""
-        alone = INTERPRETED or self.has_specialised_code or self.h[m.N_CHANGES]
-        return not alone and has_routines(self.model.parts)
 
     @cached_property
     def breaks(self) -> np.ndarray:
@@ -141,12 +135,17 @@ class Engine:
         alone = rows in known.rows
         if self.has_specialised_code:
             self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
-        if alone and self.has_routines:
-            calls = call_list(self.model, self.h, known, rows)
-            self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
-        else:
-            self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
+        self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
+        if not self.h[m.RATES]:
+            self.h[m.RATES], self.h[m.CALLS] = self._listed(rows, silent)
         self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
+
+    def _listed(self, rows: bytes, progress: Progress) -> tuple[int, int]:
+        """Return the address of the interpreter, and of the list of calls for selected rows; of kernels without."""
+        if not has_routines(self.model):
+            return int(self.h[m.EVALUATE]), 0
+        calls = call_list(self.model, self.h, self.specialised, rows, progress)
+        return calls.loaded.interpreter, calls.words.ctypes.data
 
     @property
     def staged(self) -> bool:
@@ -160,15 +159,15 @@ class Engine:
         as an uninterrupted one.
         """
         specialised, rows, changes = self.specialised, self.selected.tobytes(), self.h[m.N_CHANGES]
-        if self.has_specialised_code or changes or self.has_routines:
+        if not INTERPRETED:
             if specialised.place is not None and specialised.group is None and self.staged:
                 where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
                 specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
             if rows not in specialised.rows and (len(specialised.rows) < SELECTIONS or changes):
                 specialised.rows.append(rows)
             for met in specialised.rows:
-                made_ready = call_list if self.has_routines else address
-                made_ready(self.model, self.h, specialised, met, progress=progress)
+                if not address(self.model, self.h, specialised, met, progress=progress):
+                    self._listed(met, progress)
         self.connect()
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:

@@ -27,11 +27,20 @@ from flexclear.dynamics.specialise.topology import Topology, topology_of
 from flexclear.system.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from flexclear.dynamics.routines.calls import CallList
     from flexclear.dynamics.routines.store import ListInstance, LoadedList
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
+#: joints, surfaces, loads and effects that routines know (`mechanics`, which is imported only to compile)
+KNOWN = {
+    *("fixed", "revolute", "prismatic", "cylindrical", "slot", "planar", "universal", "spherical", "rotation-vector"),
+    *("free", "clearance-spherical", "clearance-revolute", "clearance-slot", "ball-on-plane", "joint-force"),
+    *("joint-spring", "joint-friction", "joint-expression", "pid", "sampled-pid", "spring-damper", "line-expression"),
+    *("bushing", "point-force", "point-torque", "point-expression", "stiffening", "stops", "gears", "bushings"),
+    *("controllers", "joint_friction", "wear"),
+}
+#: bearings with friction whose loads one routine finds: its code grows with their number cubed (16: 3 s of LLVM)
+MOST_BEARINGS = 16
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
 
@@ -67,7 +76,8 @@ def equations(model: Model, mobility: Mobility) -> dict[str, str]:
         return sources.kernels(model.parts)
     topology = topology_of(model.arrays, model.arrays.h)
     names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)
-    return {name: sources.specialised(model.parts, topology, name) for name in names}
+    served = has_routines(model)
+    return {name: sources.specialised(model.parts, topology, name, routines=served) for name in names}
 
 
 def address(
@@ -85,32 +95,36 @@ def address(
     return known[rows, name]
 
 
-def has_routines(parts: Parts) -> bool:
-    """Return True when routines know all parts of a mechanism: rigid bodies and ideal joints."""
-    return not (parts.surfaces or parts.loads or parts.effects or parts.flexible)
+def has_routines(model: Model) -> bool:
+    """Return True when routines know all parts of a mechanism, and few enough bearings rub."""
+    parts = model.parts
+    loads, effects = (kind.partition(" ")[0] for kind in parts.loads), (one.name for one in parts.present)
+    known = KNOWN.issuperset([*parts.joints, *parts.surfaces, *loads, *effects])
+    return known and model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
 
 
 def call_list(
     model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
 ) -> ListInstance:
     """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
-    from flexclear.dynamics.mechanics.mechanism import evaluation  # here: they import the compiler
-    from flexclear.dynamics.mechanics.of_model import mechanism_of
+    from flexclear.dynamics.mechanics.of_topology import list_of  # here: they import the compiler
     from flexclear.dynamics.routines.store import stored
-
-    def build() -> CallList:
-        topology = h.copy()
-        selection.write(model, topology, np.frombuffer(rows, dtype=bool))
-        return evaluation(mechanism_of(model, topology))
 
     if rows not in code.running:
         if rows not in code.lists:
-            offsets = h[m.ADDRESSES[-1] + 1 : m.HEADER]
-            key = repr(model.parts).encode() + rows + model.arrays.h.tobytes() + offsets.tobytes()
+            parts, topology = model.parts, topology_of(model.arrays, selected(model, h, rows))
             with _making:
-                code.lists[rows] = stored(key, build, partial(progress, None))
-        code.running[rows] = code.lists[rows].instance()
+                key = repr((parts, topology)).encode()
+                code.lists[rows] = stored(key, lambda: list_of(parts, topology), partial(progress, None))
+        code.running[rows] = code.lists[rows].instance(h)
     return code.running[rows]
+
+
+def selected(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
+    """Return a copy of h with the selection of closure rows."""
+    h = h.copy()
+    selection.write(model, h, np.frombuffer(rows, dtype=bool))
+    return h
 
 
 def made(
@@ -124,20 +138,19 @@ def made(
     exact: bool = False,
 ) -> int:
     """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
-    h, parts, of_steps = h.copy(), model.parts, name == SPECIALISED
+    parts, of_steps, served = model.parts, name == SPECIALISED, has_routines(model)
     changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
-    selection.write(model, h, np.frombuffer(rows, dtype=bool))
     with _making:  # engines may run concurrently
-        topology = topology_of(model.arrays, h)
+        topology = topology_of(model.arrays, selected(model, h, rows))
         key = (parts, topology, name, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
-                source = sources.batched(parts, topology, lanes)
+                source = sources.batched(parts, topology, lanes, routines=served)
             else:
                 source = (
-                    sources.tangent(parts, topology)
+                    sources.tangent(parts, topology, routines=served)
                     if changes
-                    else sources.specialised(parts, topology, name, exact=exact)
+                    else sources.specialised(parts, topology, name, exact=exact, routines=served)
                 )
             try:
                 _known[key] = functions.specialised(name, source, partial(progress, None))

@@ -1,0 +1,157 @@
+"""Contacts, loads, gears and friction of a topology: their objects, with the places of their numbers in the arrays."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact.wear import LEDGER
+from flexclear.dynamics.mechanics.contacts import stop, touch
+from flexclear.dynamics.mechanics.gears import coupling
+from flexclear.dynamics.mechanics.loads import STATES, Law, act
+from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link, Rubbed, Rubbing
+from flexclear.dynamics.mechanics.tables import Tables
+from flexclear.dynamics.mechanics.trees import Site
+from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
+from flexclear.dynamics.routines.calls import MODES, RATES, STATE, Cell, cells
+
+#: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
+Gauge: Any = namedtuple("Gauge", "turning side axis sine_f sine_g cosine_f cosine_g")
+Bearing: Any = namedtuple("Bearing", "kind side axis")
+
+
+def actions_of(tables: Tables, ground: Carrier, frames: list[Frame]) -> list[Action]:
+    """Return all contacts, stops and loads; frames: of all sites."""
+    return [*_contacts(tables, frames), *_loads(tables, Frame(ground, Site(ZERO, UNIT)), frames)]
+
+
+def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
+    """Return contacts and stops, with the places of what steps read of them and of their books."""
+    parts, slot, made = tables.parts, tables.nq + tables.nv, list[Action]()
+    worn = tables.table(m.NAMED["worn"])["contact"].tolist()
+    wear0 = slot + tables.size(m.SIZES["wear_slot"])
+    for c, row in enumerate(tables.table(m.CONTACTS)):
+        numbers, closed, latched = (
+            tables.record("contact_numbers", c),
+            Cell(MODES, c),
+            tables.stretch(m.LATCHED, c, 1)[0],
+        )
+        books = cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
+        results, form = [*tables.row(m.NAMED["touch"], c), *books], parts.forms[row["normal"]]
+        given: tuple[Any, ...]
+        if c < tables.size(m.N_SURFACES):
+            if c in worn:
+                results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)
+            bristle, rates = (cells(array, int(row["bristle"]), 3 * (row["bristle"] >= 0)) for array in (STATE, RATES))
+            laws = form, parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
+            given = parts.surfaces[row["surfaces"]], laws, int(c in worn), numbers, closed, latched, bristle
+        else:
+            gauge, turns, rates = _gauge(tables, row["surfaces"])
+            given = form, gauge, numbers, closed, latched, turns
+        ends = [frames[row["outer"]], frames[row["inner"]]]
+        made.append(Action(touch if len(given) == 7 else stop, given, ends, [*results, *rates]))
+    return made
+
+
+def _gauge(tables: Tables, k: int) -> tuple[Any, list[Cell], list[Cell]]:
+    """Return a gauge, with the angle whose full turns it counts, and where the rate of that is stored."""
+    row = tables.table(m.GAUGES)[k]
+    return Gauge(*(int(row[name]) for name in Gauge._fields)), *_internal(tables, int(row["turns"]), 1)
+
+
+def _internal(tables: Tables, first: int, count: int) -> tuple[list[Cell], list[Cell]]:
+    """Return internal states, none for a negative index, and where their rates are stored."""
+    at = tables.ny - tables.size(m.N_INTERNAL) + first
+    state, rates = (cells(array, at, count if first >= 0 else 0) for array in (STATE, RATES))
+    return state, rates
+
+
+class _Reading:
+    """Frames between which a load acts, then others that it reads; its coordinates; where rates of turns are stored."""
+
+    def __init__(self, tables: Tables, frames: list[Frame], between: list[Frame]) -> None:
+        self.tables, self.sites, self.frames = tables, frames, between
+        self.gauged, self.rates = list[tuple[Any, list[Cell], int, int]](), list[Cell]()
+
+    def frame(self, site: int) -> int:
+        """Return the number of a site's frame."""
+        if self.sites[site] not in self.frames:
+            self.frames.append(self.sites[site])
+        return self.frames.index(self.sites[site])
+
+    def coordinate(self, k: int) -> int:
+        """Add a coordinate by its gauge, and return its number."""
+        gauge, turns, rates = _gauge(self.tables, k)
+        row = self.tables.table(m.GAUGES)[k]
+        self.gauged.append((gauge, turns, self.frame(row["a"]), self.frame(row["b"])))
+        self.rates += rates
+        return len(self.gauged) - 1
+
+
+def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
+    """Return all loads, with the places of their numbers, laws and states, and of what they store."""
+    rows, kinds, looks = (tables.table(one) for one in (m.LOADS, m.LOAD_KINDS, m.LOOKS))
+    names = [name for name, one in zip(tables.parts.loads, kinds, strict=True) for _ in range(one["n_loads"])]
+    ends = {"law0": tables.size(m.N_LAWS), "number0": tables.size(m.N_LOAD_NUMBERS)}
+    ends |= {"look0": len(looks), "bend0": tables.size(m.N_LOAD_BENDS)}
+    spans = [list(pairwise([*rows[name].tolist(), end])) for name, end in ends.items()]
+    made = list[Action]()
+    for row, name, law, number, look, bend in zip(rows, names, *spans, strict=True):
+        kind = tuple(name.split(maxsplit=1))
+        states, rates = _internal(tables, int(row["internal0"]), STATES.get(kind[0], 0))
+        reading = _Reading(tables, frames, [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]])
+        for k in (row["gauge"], row["measured"]):
+            if k >= 0:
+                reading.coordinate(k)
+        read = []
+        for i, index in enumerate(looks["index"][slice(*look)].tolist()):
+            joint = {f"q{i}", f"r{i}"}.intersection(name.split())
+            read.append((1, reading.coordinate(index)) if joint else (0, reading.frame(index)))
+        given = (
+            kind,
+            int(row["follows"]),
+            tables.row(m.LOAD_NUMBERS, number[0], number[1] - number[0]),
+            [Law(*tables.record("law", k)[:2]) for k in range(*law)],
+            states,
+            reading.gauged,
+            read,
+        )
+        bends = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
+        made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
+    return made
+
+
+def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[Any, tuple[Any, ...], list[Frame], list[Cell]]:
+    """Return the routine of a gear, what it is given, the frames of both joints, and where rates of turns are stored.
+
+    The second joint comes first.
+    """
+    rows, gauges = tables.table(m.NAMED["couplings"])[k], tables.table(m.GAUGES)
+    which = [int(rows[side]) for side in ("second", "first")]
+    how, turns, rates = zip(*(_gauge(tables, g) for g in which), strict=True)
+    joints = [frames[gauges[g][end]] for g in which for end in ("a", "b")]
+    return coupling, (how, turns, tables.record("coupling_numbers", k)), joints, [cell for one in rates for cell in one]
+
+
+def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
+    """Return the friction of ideal joints, whose links are marked; carriers: the ground, then all links."""
+    table, laws, made = tables.table, tables.parts.kinds("joint_friction"), list[Rubbing]()
+    slot = tables.size(m.SIZES["joint_friction_slot"])
+    for k, row in enumerate(table(m.NAMED["rubbing"])):
+        bearings = []
+        for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
+            one = table(m.NAMED["bearings"])[e]
+            what, numbers = Bearing(*(int(one[name]) for name in Bearing._fields)), tables.record("bearing_numbers", e)
+            bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
+            bends, load = tables.row(m.NAMED["bends"], e), tables.record("bearing", e).load
+            given = what, laws[one["law"]], numbers, bristle
+            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:]))
+        link = carriers[row["link"]] if row["link"] >= 0 else None
+        if isinstance(link, Link):
+            link.rubbed = True
+        joint, second = (frames[row["site_a"]], frames[row["site_b"]]), -1 if row["reversed"] else 1
+        made.append(Rubbing(joint, link, second, int(row["closure"]), bearings, slot + k))
+    return made

@@ -1,0 +1,94 @@
+"""Contacts of two surfaces, and stops at the ends of joint coordinates: their forces, and what steps read of them.
+
+Both forces act at one point Q on the inner surface, so that they conserve angular momentum; the sliding velocity is
+that of the material points at Q, so that rolling is no sliding. A stop's gap is one along the coordinate.
+
+What steps read is a row of `memory.TOUCH`, followed by the rates of the books: power of damping, power of friction,
+impulse; of contacts with wear sliding distance and load path (Archard 1953, Journal of Applied Physics 24, 981-988).
+Source: Wang & Wang (2019), eqs. (23), (24).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flexclear.dynamics.contact.form import FORMS
+from flexclear.dynamics.contact.friction import FRICTION_LAWS
+from flexclear.dynamics.mechanics.coordinates import along
+from flexclear.dynamics.mechanics.surfaces import SURFACES, across
+from flexclear.dynamics.mechanics.trees import End, Numbers, carried, moving, on_both
+from flexclear.dynamics.mechanics.vectors import ZERO, Vector, Wrench, cross, dot
+from flexclear.dynamics.routines.calls import routine
+from flexclear.dynamics.routines.symbols import branch, larger, shared, sqrt
+
+
+def push(form: str, numbers: Any, depth: Any, approach: Any, latched: Any) -> tuple[Any, Any, Any]:
+    """Return the normal force of a law [N or N m], the power that its damping takes, and the energy that it stores.
+
+    depth: penetration.  latched: the rate at which this contact began.
+    """
+    law, depth = FORMS[form], larger(0.0, depth)
+    elastic, damping = shared(law.force)(depth, approach, larger(latched, numbers.floor), numbers)
+    return larger(0.0, elastic + damping), damping * approach, shared(law.stored)(depth, numbers)
+
+
+def rub(law: str, numbers: Numbers, bristle: Numbers, slip: Vector, N: Any) -> tuple[Vector, Any, Any, Vector]:
+    """Return the friction of a law (none: "") on the inner body, the power that it takes, the energy that its bristles
+    store, and their rate; slip: sliding velocity."""
+    if not law:
+        return ZERO, 0.0, 0.0, ZERO
+    force, lost, bent, rate = shared(FRICTION_LAWS[law].traction)(bristle or ZERO, slip, N, numbers)
+    return Vector(force), lost, bent, Vector(rate)
+
+
+@routine
+def touch(
+    surfaces: str,
+    laws: tuple[str, str],
+    worn: int,
+    numbers: Any,
+    closed: Any,
+    latched: Any,
+    bristle: Numbers,
+    *ends: End,
+) -> Any:
+    """Return what steps read of a contact, the rates of its books and bristles; then the wrenches on both bodies.
+
+    laws: form of its normal force, friction law or "".  worn: 1 with wear, else 0.  closed: 1 where the surfaces touch.
+    bristle: deflection, in axes of the outer frame, of a law that has some.  ends: of the outer and the inner surface.
+    """
+    A, B = (carried(*end) for end in ends)
+    p = B.p_WB - A.p_WB
+    near = SURFACES[surfaces](numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p))
+    gap, approach, n, turning, offset = near
+    z = across(n, A.R_WB @ Vector(bristle)) if bristle else ZERO
+
+    def forces() -> Any:
+        N, taken, stored = push(laws[0], numbers, -gap, approach, latched)
+        Q = B.p_WB + numbers.radius * n
+        slip = across(n, moving(B, Q) - moving(A, Q))
+        speed = sqrt(dot(slip, slip))
+        friction, lost, bent, z_rate = rub(laws[1], numbers.friction_law, z, slip, N)
+        rate = A.R_WB.T @ (across(n, z_rate) - dot(turning, z) * n)
+        read = N, -lost, taken, stored, bent, speed if laws[1] else 0.0
+        return read, friction - N * n, Q, (taken, -dot(friction, slip), N, speed, speed * N), rate
+
+    apart = (0.0,) * 6, ZERO, ZERO, (0.0,) * 5, ZERO
+    read, F, Q, books, rate = branch(closed == 1, forces, lambda: apart)
+    stored = gap, approach, read, F, A.R_WB.T @ offset, Q, books[: 5 if worn else 3], rate if bristle else ()
+    return stored, on_both(ends, B, Wrench(cross(Q - B.p_WB, F), F)), ()
+
+
+@routine
+def stop(form: str, gauge: Any, numbers: Any, closed: Any, latched: Any, turns: Numbers, *ends: End) -> Any:
+    """Return the same of the end of a joint coordinate, and the rate of its turns; the force acts along it."""
+    F, G = (carried(*end) for end in ends)
+    value, rate, unit = along(gauge, turns, F, G)
+    limit, sense = numbers.shape
+    gap, approach = sense * (limit - value), sense * rate
+    law = branch(closed == 1, lambda: push(form, numbers, -gap, approach, latched), lambda: (0.0, 0.0, 0.0))
+    N, taken, stored = law
+    wrench = unit * (-sense * N)
+    force = wrench.moment if gauge.turning else wrench.force
+    read = gap, approach, (N, 0.0, taken, stored, 0.0, 0.0), force, (numbers.clearance - gap, 0.0, 0.0), ZERO
+    return (read, (taken, 0.0, N), [rate for _ in turns]), on_both(ends, G, wrench), ()

@@ -1,0 +1,353 @@
+"""The calls that compute the rates of the state of a mechanism, from its objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.mechanics import bearings as b
+from flexclear.dynamics.mechanics import closures as c
+from flexclear.dynamics.mechanics import flexible as f
+from flexclear.dynamics.mechanics import trees as t
+from flexclear.dynamics.mechanics.mechanism import Closure, Frame, Link, Mechanism, Modes, Rubbing
+from flexclear.dynamics.mechanics.trees import (
+    Columns,
+    Coordinates,
+)
+from flexclear.dynamics.mechanics.vectors import Wrench
+from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell, routine
+from flexclear.dynamics.routines.symbols import select
+
+
+@routine
+def status(reports: t.Numbers, sound: Any, least: Any, jammed: Any) -> tuple[Any]:
+    """Return the report of an evaluation, from those of `trees.eliminate`, `closures.cholesky` and `bearings.loads_of`.
+
+    reports: of a sound evaluation, of a jammed mechanism, of a singular pose, of massless coordinates.
+    """
+    sound_one, jam, singular, massless = reports
+    regular = select(least > c.SINGULAR, select(jammed > 0.5, jam, sound_one), singular)
+    return (select(sound > 0.5, regular, massless),)
+
+
+#: reports in the order of `status`
+REPORTS = (m.OK, m.JAMMED, m.SINGULAR, m.NOT_POSITIVE)
+
+
+def evaluated(mechanism: Mechanism, calls: CallList) -> CallList:
+    """Append the calls that store the rates of the state, and what steps read besides: contacts, bearings and kinks of
+    loads, residuals of the loops, and the independence of their rows."""
+    with calls.building():
+        placed(mechanism)
+        supplied = acted(mechanism, calls)
+        sound = eliminated(mechanism)
+        loops, jammed = closed(mechanism, calls), 0.0
+        if mechanism.rubbing:
+            lost, jammed = rubbed(mechanism, loops, calls)
+            supplied += lost
+        accelerated(mechanism, calls)
+        calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_links(mechanism)]))
+        calls.store([Cell(RESULTS, 0)], status, [calls.number(one) for one in REPORTS], sound, loops.least, jammed)
+    return calls
+
+
+def placed(mechanism: Mechanism) -> None:
+    """Compute the motion of all links, with the known part of their accelerations."""
+    mechanism.ground.motion = t.ground(mechanism.gravity)
+    for link in mechanism.links:
+        link.motion, link.step = t.place(link.kind, *link.frame.placed, link.coordinates)
+        if modes := link.modes:
+            given = modes.held, link.motion, link.step, modes.inboard, *modes.moving
+            link.motion, link.step, modes.twists = f.body_of(*given)
+
+
+def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
+    """Apply contacts and loads to all bodies; return powers by their books."""
+    powers, rigidly = list[tuple[int, Any]](), dict[Link, Wrench]()
+    for one in mechanism.actions:
+        ends = [frame.placed for frame in one.frames]
+        wrenches, supplied = calls.store(one.results, one.routine, *one.given, *ends)
+        for frame, wrench in zip(one.frames, wrenches, strict=False):
+            link = frame.carrier
+            if frame.deformed[1]:
+                frame.push(wrench)
+            elif isinstance(link, Link):
+                rigidly[link] = t.added(rigidly[link], wrench) if link in rigidly else wrench
+        powers += [(one.book + k, power) for k, power in enumerate(supplied) if not _zero(power)]
+    for link, wrench in rigidly.items():
+        link.beyond.append((t.pushed(wrench), ()))
+    return powers
+
+
+def eliminated(mechanism: Mechanism) -> Any:
+    """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass."""
+    sound: Any = 1.0
+    for link in reversed(mechanism.links):
+        carried_on = int(link.on_link)
+        if modes := link.modes:
+            more: Any = [0.0] * len(modes.q)
+            for station in modes.stations:
+                more = f.bend(more, station, modes.q)
+            need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
+            modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
+        elif link.driven or link.rubbed:
+            link.rest = t.resist(link.motion, link.body, link.beyond)
+        if link.driven:
+            rest = t.carry(link.step, link.rest) if link.on_link else None
+        elif link.modes or link.rubbed:
+            rest, link.gains, link.forces, sound = t.free_joint(carried_on, link.rest, link.bounds, link.step, sound)
+        else:
+            given = carried_on, link.motion, link.body, link.bounds, link.step, link.beyond, sound
+            rest, link.gains, link.forces, sound = t.eliminate(*given)
+        if rest:
+            link.frame.resist(rest)
+    return sound
+
+
+class Spread(NamedTuple):
+    """Rows passed from their ends to the ground: V by what they move, and wrenches through joints that are watched."""
+
+    V: dict[Link | Modes, c.Rows]
+    through: dict[Link, c.Wrenches]
+
+
+class Loops(NamedTuple):
+    """Closures that are solved for: their rows passed to the ground, with their wrenches on the second body, and their
+    multipliers; the factor of their matrix, and its smallest pivot."""
+
+    found: dict[int, Spread]
+    on_second: dict[int, c.Wrenches]
+    multipliers: dict[int, t.Numbers]
+    L: c.Blocks
+    least: Any
+
+    def solved(self, right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
+        """Return the multipliers for right-hand sides."""
+        return dict(zip(self.found, c.solved(self.L, right), strict=True))
+
+
+def closed(mechanism: Mechanism, calls: CallList) -> Loops:
+    """Add the closures' forces to those of all links."""
+    found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
+    numbers, on_second = list[int](), dict[int, c.Wrenches]()
+    for number, one in enumerate(mechanism.closures):
+        kept, ends = len(one.scales), (frame.placed for frame in one.frames)
+        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *ends)
+        if not kept:
+            continue
+        i = len(found)
+        mine, gamma, S[i, i] = passed_inwards(list(zip(one.frames, wrenches, strict=True)), gamma)
+        for moved, V in mine.V.items():
+            for k in moved_by.setdefault(moved, []):
+                before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
+                S[i, k] = c.coupled(before, V, found[k].V[moved])
+            moved_by[moved].append(i)
+        found.append(mine)
+        right.append(gamma)
+        numbers.append(number)
+        on_second[number] = wrenches[1]
+    if not mechanism.closures:
+        return Loops({}, {}, {}, {}, 1.0)
+    L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
+    calls.write([mechanism.least_pivot], [least])
+    multipliers = dict(zip(numbers, c.solved(L, right), strict=True))
+    loops = Loops(dict(zip(numbers, found, strict=True)), on_second, multipliers, L, least)
+    for number, mine in loops.found.items():
+        for moved, V in mine.V.items():
+            moved.forces = c.with_multipliers(moved.forces, V, multipliers[number])
+        for link, on_it in mine.through.items():
+            link.closing.append((on_it, multipliers[number]))
+    return loops
+
+
+def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
+    """Compute the accelerations of all links from their forces; store the rates of the state, if there are calls."""
+    for link in mechanism.links:
+        if link.driven:
+            link.acceleration = t.follow(link.frame.acceleration, link.step)
+        else:
+            given = link.frame.acceleration, link.step, link.gains, link.forces
+            if calls:
+                link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
+            else:
+                _, link.acceleration = t.accelerate("fixed", Coordinates((), (), ()), *given)
+        if modes := link.modes:
+            on_shapes = modes.gains, modes.forces, link.acceleration
+            if calls:
+                to_modes = modes.basis, modes.body.T, modes.u
+                modes.accelerations = calls.store(modes.rates, f.accelerate, *to_modes, *on_shapes)
+            else:
+                _, modes.accelerations = f.accelerate((), (), (), *on_shapes)
+
+
+# Friction of ideal joints ---------------------------------------------------------------------------------------------
+class Influence(NamedTuple):
+    """What a bearing does per normal force: L^-1 of its forces by what they move; wrenches on links that are watched,
+    and the multipliers of closures; its wrench on the second body at the joint's frame."""
+
+    forces: dict[Link | Modes, t.Numbers]
+    through: dict[Link, Wrench]
+    multipliers: dict[int, t.Numbers]
+    unit: Wrench
+
+
+def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tuple[int, Any]], Any]:
+    """Add friction of joints to the forces of all links, and to those on drives; return lost powers by their books, and
+    1 where friction jams the mechanism."""
+    influences, bearings, losses = list[Influence](), list[Any](), list[Any]()
+    for joint in mechanism.rubbing:
+        ends, wrenches, units = [frame.placed for frame in joint.frames], list[Any](), list[Wrench]()
+        for one in joint.bearings:
+            on_both, unit, loss, R_WB = calls.store(one.sliding, b.friction_of, *one.given, *ends)
+            wrenches.append(on_both)
+            units.append(unit)
+            losses.append(loss)
+            bearings.append((one.given[0], one.given[2], R_WB))
+        ends_of_rows = list(zip(joint.frames, zip(*wrenches, strict=True), strict=True))
+        spread, *_ = passed_inwards(ends_of_rows, [0.0] * len(units))
+        influences += [influence(loops, spread, k, unit) for k, unit in enumerate(units)]
+
+    of_bearing = [joint for joint in mechanism.rubbing for _ in joint.bearings]
+    places = [one for joint in mechanism.rubbing for one in joint.bearings]
+    loads, bends = [one.load for one in places], [cell for one in places for cell in one.bends]
+    reactions = reactions_of(mechanism, loops, list(zip(influences, of_bearing, strict=True)))
+    jammed = calls.store([*loads, *bends], b.loads_of, bearings, *reactions)
+
+    for moved in moving(mechanism):
+        V = [by.forces.get(moved, [0.0] * len(moved.forces)) for by in influences]
+        moved.forces = c.with_multipliers(moved.forces, list(zip(*V, strict=True)), loads)
+    for number, mine in loops.found.items():
+        rows = list(zip(*(by.multipliers[number] for by in influences), strict=True))
+        more = c.with_multipliers([0.0] * len(rows), rows, loads)
+        for link, on_it in mine.through.items():
+            link.closing.append((on_it, more))
+    for by, load in zip(influences, loads, strict=True):
+        for link, wrench in by.through.items():
+            link.closing.append(([wrench], [load]))
+    powers = [b.lost(*one) for one in zip(loads, losses, strict=True)]
+    return [(joint.book, power) for joint, power in zip(of_bearing, powers, strict=True)], jammed
+
+
+def moving(mechanism: Mechanism) -> list[Link | Modes]:
+    """Return all that forces move."""
+    return [moved for link in mechanism.links for moved in (link, link.modes) if moved]
+
+
+def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
+    """Return what bearing k of a joint does per normal force, while all loops stay closed."""
+    forces: dict[Link | Modes, t.Numbers] = {moved: [row[k] for row in V] for moved, V in spread.V.items()}
+    right = list[Any]()
+    for number, one in loops.found.items():
+        rows: c.Rows = [[0.0]] * len(loops.multipliers[number])
+        for moved, V in one.V.items():
+            if moved in forces:
+                rows = c.coupled(rows, V, [[force] for force in forces[moved]])
+        right.append(c.opposite([row[0] for row in rows]))
+    multipliers = loops.solved(right)
+    for number, one in loops.found.items():
+        for moved, V in one.V.items():
+            forces[moved] = c.with_multipliers(forces.get(moved, [0.0] * len(V)), V, multipliers[number])
+    return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
+
+
+def reactions_of(
+    mechanism: Mechanism, loops: Loops, influences: Sequence[tuple[Influence, Rubbing]]
+) -> tuple[list[Wrench], list[list[Wrench]]]:
+    """Return the reactions of each bearing's joint: without friction, and per normal force of each bearing."""
+    joints, without = mechanism.rubbing, {moved: moved.forces for moved in moving(mechanism)}
+    accelerated(mechanism)
+    smooth, parts = [reaction(loops, joint) for joint in joints], list[list[Wrench]]()
+    for by, of_joint in influences:
+        for moved, forces in without.items():
+            moved.forces = by.forces.get(moved, [0.0] * len(forces))
+        accelerated(mechanism)
+        parts.append([reaction(loops, joint, by, own=joint is of_joint) for joint in joints])
+    for moved, forces in without.items():
+        moved.forces = forces
+    of_bearing = [k for k, joint in enumerate(joints) for _ in joint.bearings]
+    return [smooth[k] for k in of_bearing], [[part[k] for part in parts] for k in of_bearing]
+
+
+def reaction(loops: Loops, joint: Rubbing, by: Influence | None = None, *, own: bool = False) -> Wrench:
+    """Return the wrench of a joint on its second body at present accelerations: without friction, or `by` that of a
+    bearing alone; own: True for a bearing of the joint itself."""
+    second, link, multipliers = joint.frames[1].placed, joint.link, (by or loops).multipliers
+    if link is None:
+        rows = loops.on_second.get(joint.closure, []), multipliers.get(joint.closure, [])
+        return b.reaction_in_loop(*rows, [by.unit] if by and own else [], second)
+    passing = [(one.through[link], multipliers[number]) for number, one in loops.found.items() if link in one.through]
+    if by and not own and link in by.through:
+        passing.append(([by.through[link]], [1.0]))
+    known = int(by is None)
+    return b.reaction_in_tree(joint.second, link.rest, link.acceleration, known, passing, link.motion, second)
+
+
+def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tuple[c.Blocks, Any]:
+    """Return the factor of J M^-1 J^T, lower blocks by two closures, and its smallest pivot; store its diagonals."""
+    rest, L, least = dict(S), c.Blocks(), 1.0
+    for j, one in enumerate(closures):
+        given = rest[j, j], [row[i] for i, row in enumerate(S[j, j])], one.scales, least
+        L[j, j], least = calls.store([*one.diagonal, *one.roots], c.cholesky, *given)
+        column = [i for i in range(j + 1, len(closures)) if (i, j) in rest]
+        for at, i in enumerate(column):
+            L[i, j] = c.below(rest[i, j], L[j, j])
+            for k in column[: at + 1]:
+                before = rest.get((i, k)) or [[0.0] * len(L[k, j])] * len(L[i, j])
+                rest[i, k] = c.eliminated(before, L[i, j], L[k, j])
+    return L, least
+
+
+def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
+    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
+    found, waiting, loads = Spread({}, {}), dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
+    S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
+
+    def receive(frame: Frame, wrenches: c.Wrenches) -> None:
+        link = frame.carrier
+        if isinstance(link, Link):
+            waiting[link] = c.together(waiting[link], wrenches) if link in waiting else wrenches
+            loads.setdefault(link, []).append((wrenches, frame.deformed[1]))
+
+    for frame, wrenches in ends:
+        receive(frame, wrenches)
+    while waiting:
+        link = max(waiting, key=lambda link: link.depth)
+        wrenches, carried_on = waiting.pop(link), int(link.on_link)
+        if modes := link.modes:
+            given = modes.gains, modes.forces, loads[link], wrenches, gamma, S
+            found.V[modes], gamma, S, wrenches = f.spread(*given)
+        if link.driven or link.rubbed:
+            found.through[link] = wrenches
+        if link.gains:
+            given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
+            found.V[link], gamma, S, passed = c.spread(*given)
+        else:
+            passed = c.inwards(link.step, wrenches) if carried_on else []
+        receive(link.frame, passed)
+    return found, gamma, S
+
+
+def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
+    """Return the powers of drives, and those lost to damping of modes, by their books."""
+    powers = list[tuple[int, Any]]()
+    for link in mechanism.links:
+        if link.driven:
+            given = link.step, link.rest, link.acceleration, link.closing, link.coordinates.u
+            powers.append((link.book, t.driving_power(*given)))
+        if modes := link.modes:
+            powers.append((modes.book, f.damping_power(modes.body.damping, modes.u)))
+    return powers
+
+
+def booked(mechanism: Mechanism, powers: Iterable[tuple[int, Any]]) -> list[Any]:
+    """Return the rates of the ledger's books: sums of powers."""
+    sums: dict[int, Any] = dict.fromkeys(mechanism.ledger, 0.0)
+    for book, power in powers:
+        sums[book] = power if _zero(sums[book]) else t.added(sums[book], power)
+    return list(sums.values())
+
+
+def _zero(number: Any) -> bool:
+    """Return True for a number that is known to be zero."""
+    return isinstance(number, float) and number == 0.0
