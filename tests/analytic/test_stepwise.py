@@ -1,5 +1,6 @@
 """A motion in steps of one's own (`fc.simulation`): against whole runs, closed forms, and itself restored."""
 
+import re
 import runpy
 from itertools import pairwise
 from pathlib import Path
@@ -183,6 +184,14 @@ def test_the_example_balances_the_pole(root: Path):
     cart, pole = runpy.run_path(str(root / "docs/examples/controller.py"))["balanced"]()
     assert abs(cart) < 1e-4
     assert abs(pole) < 1e-4
+
+
+def test_the_loop_of_the_page_runs(root: Path):
+    (code,) = re.findall(r"^```python\n(.*?)^```$", (root / "docs/stepwise.md").read_text(), re.DOTALL | re.MULTILINE)
+    known: dict[str, Any] = {}
+    exec(code.replace('"scenes', f'"{root}/scenes'), known)
+    with pytest.raises(fc.InputError, match="closed"):
+        known["sim"].advance(1e-3)
 
 
 # Equations -----------------------------------------------------------------------------------------------------------
