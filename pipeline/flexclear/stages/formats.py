@@ -14,7 +14,7 @@ from flexclear.scene.load import edited
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
 from flexclear.scene.toml_files import read_toml
-from flexclear.stages import export, fmu, scenes
+from flexclear.stages import export, scenes
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace
 from flexclear.system.errors import InputError
@@ -108,6 +108,12 @@ def _carriers(scene: Scene, body: str, workplace: Workplace) -> tuple[str, Calla
     return shape["units"], nodal_loads(workplace.datasets(Graph(scene, shown=False).mesh[body])[0]).__getitem__
 
 
+def _write_fmu(scene: Scene, target: Path, asked: Mapping[str, Any], workplace: Workplace) -> str:
+    from flexclear.stages import fmu  # not for every program that imports the public functions: it computes
+
+    return fmu.write(scene, target, asked, workplace)
+
+
 def _write_state_space(scene: Scene, target: Path, asked: Mapping[str, Any], workplace: Workplace) -> str:
     made = scenes.linear(scene, asked.get("at"), workplace, "state_space", held=bool(asked.get("held")))
     export.write(made, target)
@@ -146,7 +152,7 @@ class Format(NamedTuple):
 
 
 FORMATS = {
-    "fmu": Format(fmu.write, (".fmu",), ("fmi",)),
+    "fmu": Format(_write_fmu, (".fmu",), ("fmi",)),
     "state-space": Format(_write_state_space, (".npz", ".nc", ".mat"), ("at", "held")),
     "loads": Format(_write_loads, (".csv", CARDS, ".nc", ".npz", ".mat", ".parquet", ".xlsx"), ("at", "body")),
 }
