@@ -184,8 +184,8 @@ def specialised(
     """
     if name == SPECIALISED:
         longest = "LONGEST" if exact else "LONGEST_STRAIGHT"
-        taken = [FILES, (PROGRAM, "llvm_text"), (PROGRAM, "NAME")]
-        return _of_topology(parts, topology, STRAIGHT, taken, longest, routines, exact=exact)
+        used = [FILES, (PROGRAM, "llvm_text"), (PROGRAM, "NAME")]
+        return _of_topology(parts, topology, STRAIGHT, used, longest, routines, exact=exact)
     file = _description(parts) if name == DESCRIBED else _equations(parts)
     for taken in ("llvm_text", "program", "NAME"):
         file.take(PROGRAM, taken)

@@ -315,8 +315,8 @@ def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -
         link = max(waiting, key=lambda link: link.depth)
         wrenches, carried_on = waiting.pop(link), int(link.on_link)
         if modes := link.modes:
-            given = modes.gains, modes.forces, loads[link], wrenches, gamma, S
-            found.V[modes], gamma, S, wrenches = f.spread(*given)
+            modal = modes.gains, modes.forces, loads[link], wrenches, gamma, S
+            found.V[modes], gamma, S, wrenches = f.spread(*modal)
         if link.driven or link.rubbed:
             found.through[link] = wrenches
         if link.gains:

@@ -115,14 +115,14 @@ def _modes(tables: Tables, k: int) -> Modes:
     modes = table(m.MOMENTS)["mode"][begin : begin + len(rows)]
     modal = Modal(
         of_body[0], Vector(of_body[1:4]), Matrix(of_body[4:13]), Symmetric(of_body[13:]),
-        Shapes(linear, _second(tables, data, n)), E, *diagonals,
-        [tuple(tables.row(m.MOMENT_VALUES, begin + e)) for e in range(len(rows))],
+        Shapes(linear, _second(tables, data, n)), E, diagonals[0], diagonals[1],
+        [(whole, alone) for whole, alone in (tables.row(m.MOMENT_VALUES, begin + e) for e in range(len(rows)))],
         tables.row(m.BASIS_VALUES, entries.start, len(entries)),
         moved, [[mass[i][j] if i == j or coupled[i] else 0.0 for j in range(i + 1)] for i in range(n)],
     )  # fmt: skip
     return Modes(
         _port(tables, inboard) if body["inboard"] else _site(tables, m.PORT_NUMBERS, inboard),
-        modal, *(cells(STATE, at, n) for at in (q, u)), [*cells(RATES, q, n), *cells(RATES, u, n)],
+        modal, cells(STATE, q, n), cells(STATE, u, n), [*cells(RATES, q, n), *cells(RATES, u, n)],
         tuple((int(r) // n, int(mode), int(r) % n) for r, mode in zip(rows, modes, strict=True)),
         tuple((int(mode), int(shape)) for mode, shape in table(m.BASIS)[entries.start : entries.stop]),
         held, _stations(tables, k, n), int(body["book"]),
