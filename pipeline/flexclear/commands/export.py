@@ -21,7 +21,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--fmi", metavar="VERSION", help="fmu: version of the standard, 2 or 3 (default)")
     parser.add_argument("--body", metavar="NAME", help="loads: the flexible body, if there are several")
-    parser.add_argument("--fmi", metavar="VERSION", help="fmu: version of the standard, 2 or 3 (default)")
     add_options(parser, "usual")
 
 
