@@ -26,7 +26,7 @@ PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_RUN}.run.evaluation.engine": {"prepare": "assembling"},
     f"{_RUN}.model.model": {"tabulate": "assembling"},
     f"{_RUN}.run.horizon.horizon": {"Pair.perturbed_run": "integrating"},
-    f"{_RUN}.run.run": {"RunInParts._advanced": "integrating", "observed": "recording"},
+    f"{_RUN}.run.run": {"RunInParts._advanced": "integrating", "observe_run": "recording"},
     f"{_RUN}.record.dataset": {"recorded": "recording"},
     "flexclear.post.single_run.series": {"derived": "deriving"},
 }

@@ -14,7 +14,7 @@ from flexclear import dynamics
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.run import observed
+from flexclear.dynamics.run.run import observe_run
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.scene.integrators import DEFAULT, VIBRATING
 from flexclear.scene.load import edited
@@ -159,7 +159,7 @@ def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> 
         return _sensed(engine, rows[_sampled(rows[:, 0], reference.sampling)], body)
 
     def whole() -> float:
-        return once(lambda: observed(engine, integrate(engine, start, silent)))
+        return once(lambda: observe_run(engine, integrate(engine, start, silent)))
 
     return Rung(
         what.integrator,

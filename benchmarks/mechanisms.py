@@ -16,7 +16,7 @@ from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.run import engine_of, observed
+from flexclear.dynamics.run.run import engine_of, observe_run
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.scene.clearance import ClearanceSpherical
 from flexclear.scene.load import edited, load_scene
@@ -98,7 +98,7 @@ def states(engine: Engine, run: Trajectory) -> dict[str, State]:
     record = recording.record(run.rows, run.contacts)
     found = {"free": np.flatnonzero(~np.any(record.modes == 1.0, axis=1))}
     if run.contacts:
-        forces = observed(engine, run).touch["normal_force"]
+        forces = observe_run(engine, run).touch["normal_force"]
         found["in contact"] = np.flatnonzero(np.all(forces > 0.0, axis=1))
     # the middle of the candidates: at the start many terms are zero
     middles = {name: rows[len(rows) // 2] for name, rows in found.items() if len(rows)}

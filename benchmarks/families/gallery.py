@@ -339,7 +339,7 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
     row = round(entry.at * (run.sizes["time"] - 1))
     large = Image.fromarray(film.still(drawn, row, (FINER * WIDTH, FINER * HEIGHT)))
     small = np.asarray(large.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS))
-    noted = Image.fromarray(ruler.annotated(small, drawn))
+    noted = Image.fromarray(ruler.with_scale_bar(small, drawn))
     noted.quantize(COLOURS).save(PICTURES / f"{entry.name}.png", optimize=True)
 
 

@@ -129,7 +129,7 @@ def test_closed_forms_miss_no_frequency(held: tuple[str, str], ends: str) -> Non
     span = closed_form.Span(length, E * second, RHO * area, RHO * second, shear)
     rotary = (2.0 * RHO * second, RHO * second, RHO * second)
     rod = Piece(length, E * area, 2.0 * G * second, (E * second,) * 2, RHO * area, rotary, (shear, shear))
-    bending = np.repeat(closed_form.bending(span, ends, 8), 2)
+    bending = np.repeat(closed_form.bending_frequencies(span, ends, 8), 2)
     waves = [closed_form.rod(math.sqrt(modulus / RHO), length, ends, 8) for modulus in (E, G)]
     expected = np.sort(np.concatenate([bending, *waves]))[:16]
     assert expected[-1] > math.sqrt(shear / (RHO * second)) / (2.0 * math.pi)
@@ -197,7 +197,7 @@ def test_fv5_deep_beam_has_the_exact_frequencies() -> None:
     found = lowest(fv5(), "0123", "12", 9)
     E, rho, G, A, I = 2e11, 8000.0, 2e11 / 2.6, 4.0, 4.0 / 3.0
     span = closed_form.Span(10.0, E * I, rho * A, rho * I, 5.0 / 6.0 * G * A)
-    bending = closed_form.bending(span, "pinned-pinned", 3)
+    bending = closed_form.bending_frequencies(span, "pinned-pinned", 3)
     # torsion with St. Venant's constant
     expected = np.sort(np.concatenate([np.repeat(bending, 2), [125.0], [71.20190684568453, 213.60572053705363]]))
     # St. Venant's constant has four digits there; the third mode of 8 elements is (3 pi / 8)^4 / 1440 = 1.3e-3 high

@@ -92,13 +92,13 @@ def words(ends: str) -> str:
 @pytest.mark.parametrize("ends, theory", INDEPENDENT)
 def test_closed_forms_agree_with_an_independent_program(ends: str, theory: str) -> None:
     expected = INDEPENDENT[ends, theory]
-    found = closed_form.bending(SPANS[theory], words(ends), len(expected))
+    found = closed_form.bending_frequencies(SPANS[theory], words(ends), len(expected))
     np.testing.assert_allclose(found, expected, rtol=1e-11)  # both solve to rounding times a few
 
 
 @pytest.mark.parametrize("ends", BLEVINS)
 def test_closed_forms_have_the_printed_wave_numbers(ends: str) -> None:
-    hertz = closed_form.bending(SPANS["euler-bernoulli"], words(ends), 3)
+    hertz = closed_form.bending_frequencies(SPANS["euler-bernoulli"], words(ends), 3)
     beta = (RHO * A / (E * I) * (2.0 * np.pi * hertz) ** 2) ** 0.25
     np.testing.assert_allclose(beta * L, BLEVINS[ends], rtol=0.0, atol=1e-8)  # eight printed decimals
 
@@ -116,7 +116,7 @@ def test_pinned_timoshenko_rods_have_both_spectra(length: float) -> None:
     expected = np.sort(np.sqrt(np.concatenate([lower, upper])))[:12] / (2.0 * np.pi)
     cut_off = np.sqrt(span.shear / span.rotary) / (2.0 * np.pi)
     assert (expected[-1] > cut_off) == (length < 0.1)
-    np.testing.assert_allclose(closed_form.bending(span, "pinned-pinned", 12), expected, rtol=1e-10)
+    np.testing.assert_allclose(closed_form.bending_frequencies(span, "pinned-pinned", 12), expected, rtol=1e-10)
 
 
 @pytest.mark.parametrize("theory, elements", DOCUMENTED)
@@ -126,7 +126,7 @@ def test_documented_errors_are_the_measured_ones(theory: str, elements: int) -> 
     Eighteen elements give three modes within a hundredth of a percent.
     """
     rod = build(elements=elements, theory=theory)
-    exact = np.array([closed_form.bending(SPANS[theory], words(ends), 3) for ends in ENDS])
+    exact = np.array([closed_form.bending_frequencies(SPANS[theory], words(ends), 3) for ends in ENDS])
     found = np.array([frequencies(rod, BENDING, ends, 3) for ends in ENDS])
     error = found / exact - 1.0
     # two digits are printed
@@ -139,7 +139,7 @@ def test_documented_errors_are_the_measured_ones(theory: str, elements: int) -> 
 @pytest.mark.parametrize("theory", SPANS)
 @pytest.mark.parametrize("ends", ["FF", "CC", "CF", "PP", "CP"])
 def test_bending_converges_at_order_four_in_both_planes(ends: str, theory: str) -> None:
-    exact = closed_form.bending(SPANS[theory], words(ends), 2)
+    exact = closed_form.bending_frequencies(SPANS[theory], words(ends), 2)
     elements = [8, 16, 32]
     for plane in (BENDING, BENDING_Z):
         error = [frequencies(build(elements=n, theory=theory), plane, ends, 2) / exact - 1.0 for n in elements]
@@ -149,7 +149,7 @@ def test_bending_converges_at_order_four_in_both_planes(ends: str, theory: str) 
 
 def test_condensing_the_unknowns_inside_a_timoshenko_cell_costs_two_orders() -> None:
     """Statically condensed it is the element of interdependent interpolation: exact in statics only."""
-    exact = closed_form.bending(SPANS["timoshenko"], "fixed-fixed", 2)
+    exact = closed_form.bending_frequencies(SPANS["timoshenko"], "fixed-fixed", 2)
     elements, errors = [16, 32, 64], []
     for n in elements:
         K, M = held_system(build(elements=n, theory="timoshenko"), BENDING, "CC")

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from pydantic import TypeAdapter
 
-from flexclear.dynamics.run.ledger import usual
+from flexclear.dynamics.run.ledger import default_energy_error
 from flexclear.post.single_run.series import derive
 from flexclear.scene.solver import Solver
 from flexclear.system.errors import InputError
@@ -139,7 +139,7 @@ def test_a_contact_that_the_runs_end_cuts_short_has_its_peak() -> None:
     ],
 )
 def test_the_ledger_must_close_as_well_as_the_steps_are_asked_to_be(solver: dict[str, object], fraction: float) -> None:
-    assert usual(TypeAdapter(Solver).validate_python(solver)) == pytest.approx(fraction, rel=1e-12)
+    assert default_energy_error(TypeAdapter(Solver).validate_python(solver)) == pytest.approx(fraction, rel=1e-12)
 
 
 @pytest.mark.parametrize(

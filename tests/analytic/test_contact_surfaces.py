@@ -13,7 +13,7 @@ from flexclear.post.single_run.series import PIECES, derive, spread_over_surface
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import Start
-from flexclear.scene.variants import ideal, staying
+from flexclear.scene.variants import contacts_that_stay, ideal
 from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, impacts, run
 from tests.properties.mechanisms import Table, frame, joint, rigid, scene, simulate, simulated
@@ -103,7 +103,7 @@ def test_a_plane_has_no_ideal_joint_in_its_place() -> None:
     whole = load_scene(TREE / "scenes" / f"{PLANE}.toml")
     with pytest.raises(InputError, match="that can be removed"):
         ideal(whole)
-    assert staying({name: one.type for name, one in whole.joint.items()}) == list(whole.contacts())
+    assert contacts_that_stay({name: one.type for name, one in whole.joint.items()}) == list(whole.contacts())
 
 
 def test_a_yoke_without_clearance_follows_the_cosine() -> None:

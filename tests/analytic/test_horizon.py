@@ -10,7 +10,7 @@ from flexclear.artifacts.quantities import DIVERGED, PERTURBATION, SEPARATED, la
 from flexclear.dynamics import analyses
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.run import engine_of, observed
+from flexclear.dynamics.run.run import engine_of, observe_run
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.post.single_run.series import horizon
 from flexclear.scene.load import edited, load_scene
@@ -36,7 +36,7 @@ def test_rigid_clearance_converges_over_the_whole_stroke():
 def test_frames_by_which_runs_are_compared_are_those_of_full_rows_but_for_open_loops():
     engine = engine_of(load_scene(TREE / "scenes/sps4/variants/first_csj.toml"), {}, silent)
     trajectory = integrate(engine, consistent_start(engine), silent)
-    seen, alone = observed(engine, trajectory).links, frames(engine, trajectory.rows)
+    seen, alone = observe_run(engine, trajectory).links, frames(engine, trajectory.rows)
     for field in ("origin", "axes", "omega", "velocity"):
         here, known = alone[field], seen[field]
         # rtol is 1e-10, at which loops drift; rates count per second, so that they are open by more

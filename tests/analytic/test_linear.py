@@ -9,7 +9,7 @@ import xarray as xr
 
 from flexclear.dynamics import analyses
 from flexclear.dynamics.linear.bench import state
-from flexclear.dynamics.linear.equilibrium import balanced
+from flexclear.dynamics.linear.equilibrium import bench_in_equilibrium
 from flexclear.dynamics.linear.vibrations import vibrations
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.scene.load import load_scene
@@ -274,11 +274,11 @@ def test_a_vibration_let_loose_swings_as_its_frequency_and_shape_say(number: int
     """Started with the speeds e w, a quarter period later it stands at e w / omega: for loops, balls and the rod."""
     path = TREE / "scenes" / "sps4" / "far_cb.toml"
     scene = load_scene(path)
-    bench, found, _ = balanced(scene, bundles(scene), silent, 0.09)
+    bench, found, _ = bench_in_equilibrium(scene, bundles(scene), silent, 0.09)
     small = vibrations(bench, found.at)
     omega, w = small.value[number].imag, small.shape[:, number].real
     brief = load_scene(path, {"time.end": 0.5 * np.pi / omega, "output.interval": 0.1 * np.pi / omega})
-    bench, found, _ = balanced(brief, bundles(brief), silent, 0.09)
+    bench, found, _ = bench_in_equilibrium(brief, bundles(brief), silent, 0.09)
     # far below where the rod's rotations, some 100 rad per unit, or the legs' swing would be of second order
     speed = 1e-6 * omega
     done = integrate(bench.engine, state(bench, found.at.q, speed * w), silent)

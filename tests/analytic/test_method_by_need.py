@@ -18,7 +18,7 @@ from flexclear.dynamics.record.point import Runner
 from flexclear.dynamics.run import progress_rate, trajectory
 from flexclear.dynamics.run.method_choice.accuracy import Attempt, Search, _climb, by_default
 from flexclear.dynamics.run.method_choice.method_selection import Costs, Rates
-from flexclear.dynamics.run.progress_rate import Look, limited, pace
+from flexclear.dynamics.run.progress_rate import Look, limited_by_stability, pace
 from flexclear.scene.load import edited, with_numbers
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
@@ -251,8 +251,8 @@ def test_a_hasty_start_and_a_single_impact_tell_little() -> None:
 
 def test_stability_is_looked_for_in_the_steps_of_late() -> None:
     smooth, stiff = looks((0.0, 0), (0.5, 6000)), Look(0.6, 18_000, 1500, 900)
-    assert not limited(smooth)
-    assert limited([*smooth, Look(0.55, 12_000, 1000, 450), stiff])
+    assert not limited_by_stability(smooth)
+    assert limited_by_stability([*smooth, Look(0.55, 12_000, 1000, 450), stiff])
 
 
 @pytest.mark.parametrize(

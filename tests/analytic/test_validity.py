@@ -14,7 +14,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
+from flexclear.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest_displacement
 from flexclear.dynamics.run.run import engine_of
 from flexclear.post.answers.stability import lost_energy
 from flexclear.scene.load import edited, load_scene
@@ -106,10 +106,10 @@ def test_the_largest_displacement_is_that_of_all_nodes_and_rows() -> None:
     random = np.random.default_rng(0)
     shapes, q = random.normal(size=(30, 3, 5)), random.normal(size=(200, 5)) * np.geomspace(1e-3, 1.0, 200)[:, None]
     every = np.linalg.norm(np.einsum("nam,tm->tna", shapes, q), axis=2).max(axis=1)
-    row, size = largest(shapes, q, 0.0)
+    row, size = largest_displacement(shapes, q, 0.0)
     assert row == int(every.argmax())
     assert size == pytest.approx(every.max(), rel=1e-14)  # rounding of sums of five products
-    assert largest(shapes, q, 1e3) == (0, 0.0)
+    assert largest_displacement(shapes, q, 1e3) == (0, 0.0)
 
 
 def dropped(depth: float) -> Scene:

@@ -189,7 +189,7 @@ def reduced(scene: Scene) -> dict[str, xr.Dataset]:
 def tabulated(scene: Scene, articulated: bool) -> Model:
     """The model with a given way of factoring the mass matrix."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(modelling, "articulated", lambda numbering: articulated)
+        patch.setattr(modelling, "is_deep_tree", lambda numbering: articulated)
         return tabulate(build(scene, reduced(scene)))
 
 

@@ -223,7 +223,7 @@ def test_flexible_bodies_have_the_mass_that_their_energy_says(name: str) -> None
     M, modes, speeds = mass_by_energy(one), modes_of(one.model.arrays), one.model.speeds
     L = modes @ mass_factor(cast("Engine", one))
     assert apart(L @ L.T, M) < 1e-12  # differences of energies in extended precision
-    J = selection.dense(one.model, one.h, one.stretch(m.JACOBIAN)) @ modes.T
+    J = selection.dense_rows(one.model, one.h, one.stretch(m.JACOBIAN)) @ modes.T
     gamma = one.stretch(m.GAMMA)[selection.selected_indices(one.model, one.h)]
     full = np.block([[M, J.T], [J, np.zeros((len(J),) * 2)]])
     forces = np.concatenate([-modes @ other.stretch(m.BIAS)[: one.model.nv], gamma])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.dynamics.model.assembly import assembled
+from flexclear.dynamics.model.assembly import assemble
 from flexclear.dynamics.model.mechanism import Mechanism, build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.starts import equilibrium
@@ -78,7 +78,7 @@ def test_where_a_free_coordinate_starts_is_reported_unless_the_scene_says_it() -
     sought = equilibrium.placed(
         whole.model_copy(update={"start": whole.start.model_copy(update={"at": "equilibrium"})})
     )
-    assert assembled(build(sought, {})).choice == ""
+    assert assemble(build(sought, {})).choice == ""
 
 
 def test_a_chain_without_poses_starts_at_zero_without_a_word() -> None:

@@ -44,7 +44,7 @@ def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
     h, w = found.h, found.w
     assert found.report == m.OK
     assert model.arrays.table(m.CLOSURES, h)["n_kept"].tolist() == rows
-    J, S = (selection.dense(model, h, w[h[place] :][: h[m.JACOBIAN_SIZE]]) for place in (m.JACOBIAN, m.SPREAD))
+    J, S = (selection.dense_rows(model, h, w[h[place] :][: h[m.JACOBIAN_SIZE]]) for place in (m.JACOBIAN, m.SPREAD))
     L = dense_factor(model.arrays.table(m.ENVELOPE), w[h[m.MASS] :])
     C = dense_factor(model.arrays.table(m.CLOSURE_ENVELOPE, h)[: len(J)], w[h[m.SCHUR] :])
     bias = w[h[m.GAMMA] :][selection.selected_indices(model, h)]

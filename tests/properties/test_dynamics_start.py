@@ -9,7 +9,7 @@ import pytest
 from flexclear import dynamics
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.events.impulse import apply_impulses
-from flexclear.dynamics.model.assembly import assembled
+from flexclear.dynamics.model.assembly import assemble
 from flexclear.dynamics.model.given_start import corrected_starts
 from flexclear.dynamics.model.mechanism import Mechanism, build
 from flexclear.dynamics.model.mobility import analyse
@@ -173,7 +173,7 @@ def driven(given: float, law: float, **crank: Any) -> dict[str, Any]:
 
 def start_of(table: dict[str, Any]) -> Mechanism:
     """The mechanism at its start; nothing is compiled for it."""
-    return assembled(build(Scene.model_validate(table), {}))
+    return assemble(build(Scene.model_validate(table), {}))
 
 
 def test_a_pose_that_contradicts_a_drive_is_refused_with_both_values() -> None:

@@ -8,7 +8,7 @@ import pytest
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.run import trajectory as stepping
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.run import observed
+from flexclear.dynamics.run.run import observe_run
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError
@@ -115,7 +115,7 @@ def test_only_full_reflection_keeps_the_energy(rho: float) -> None:
     )
     start = consistent_start(engine)
     made = stepping.integrate(engine, start, lambda fraction, text: None)
-    energy = observed(engine, made).energy
+    energy = observe_run(engine, made).energy
     total = energy["kinetic"] + energy["potential"]
     lost = (total[0] - total[-5:].mean()) / np.ptp(energy["potential"])
     # 0.8 % of what swings to and fro, and otherwise 5.4 % at least; the bound lies between, by like factors

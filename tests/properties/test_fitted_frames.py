@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flexclear.artifacts.labelled import of
-from flexclear.dynamics.model.assembly import assembled, residuals
+from flexclear.dynamics.model.assembly import assemble, residuals
 from flexclear.dynamics.model.constraints import constraints
 from flexclear.dynamics.model.mechanism import build
 from flexclear.scene.load import edited, load_scene
@@ -48,7 +48,7 @@ def four_bar(random: Random, miss: float, tolerance: float) -> Scene:
 def test_a_loop_with_frames_that_nearly_fit_closes(seed: int) -> None:
     random = Random(seed)
     miss = 10.0 ** random.uniform(-9.0, -5.0)
-    fits = assembled(build(four_bar(random, miss, 2.0 * miss), {}))
+    fits = assemble(build(four_bar(random, miss, 2.0 * miss), {}))
     left = residuals(constraints(fits), [link.start for link in fits.links])
     assert max(left.values()) < 1e-11 * fits.length  # what a closing may leave
     assert "frame_tolerance" in fits.choice
@@ -63,7 +63,7 @@ def test_a_loop_without_poses_closes_as_well(seed: int) -> None:
     for name in ("crank", "coupler", "rocker"):
         del table["body"][name]["pose"]
     table["start"] = {"joint": {"o0": {"position": 0.1}}}
-    fits = assembled(build(Scene.model_validate(table), {}))
+    fits = assemble(build(Scene.model_validate(table), {}))
     left = residuals(constraints(fits), [link.start for link in fits.links])
     assert max(left.values()) < 1e-11 * fits.length  # what a closing may leave
     assert "coupler by up to" in fits.choice
@@ -79,14 +79,14 @@ def test_frames_of_flexible_bodies_fit_too(miss: float) -> None:
     array = bundle["frame_position"]
     bent = replace(array, values=array.values + miss * np.array([[0.0, 0.0, 1.0], [0.0] * 3, [0.0] * 3]))
     off = {"rod": replace(bundle, variables={**bundle.variables, "frame_position": bent})}
-    fits = assembled(build(posed, off))
+    fits = assemble(build(posed, off))
     left = residuals(constraints(fits), [link.start for link in fits.links])
     assert max(left.values()) < 1e-11 * fits.length
     # the slider is where the rod and the crank, in line, put it
     assert fits.links[fits.link_of["slider"]].start.p[0] + fits.origin[0] == pytest.approx(0.45, abs=miss)
     far = replace(array, values=array.values + 2e-3 * np.array([[0.0, 0.0, 1.0], [0.0] * 3, [0.0] * 3]))
     with pytest.raises(InputError, match="cannot be assembled"):  # a thousandth of 300 mm is less
-        assembled(build(posed, {"rod": replace(bundle, variables={**bundle.variables, "frame_position": far})}))
+        assemble(build(posed, {"rod": replace(bundle, variables={**bundle.variables, "frame_position": far})}))
 
 
 def test_fixed_joints_of_bodies_whose_frames_are_known_to_a_tolerance_fit_poses() -> None:
@@ -101,7 +101,7 @@ def test_fixed_joints_of_bodies_whose_frames_are_known_to_a_tolerance_fit_poses(
         joints = {"hinge": joint("revolute", "ground.o", "a.o"), "weld": joint("fixed", "a.end", "b.o")}
         return Scene.model_validate(scene(bodies, joints))
 
-    assert assembled(build(pieces(1e-5), {})).links[-1].mass == 2.0
+    assert assemble(build(pieces(1e-5), {})).links[-1].mass == 2.0
     with pytest.raises(InputError, match="contradicts the poses"):
         build(pieces(0.0), {})
 
@@ -109,4 +109,4 @@ def test_fixed_joints_of_bodies_whose_frames_are_known_to_a_tolerance_fit_poses(
 @pytest.mark.parametrize("tolerance", [0.0, 1e-9])
 def test_frames_that_are_exact_or_known_better_are_refused(tolerance: float) -> None:
     with pytest.raises(InputError, match="nearly equal conditions"):
-        assembled(build(four_bar(Random(1), 1e-6, tolerance), {}))
+        assemble(build(four_bar(Random(1), 1e-6, tolerance), {}))

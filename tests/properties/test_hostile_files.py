@@ -178,7 +178,7 @@ def test_a_mesh_that_would_never_end_is_refused(name: str, tmp_path: Path) -> No
     import meshio  # noqa: F401 - its import is none of the refusal
 
     with refused(words):
-        imported.read(MeshFile(type="mesh-file", file=name, length_unit="mm"), tmp_path, "recipe")
+        imported.read_geometry(MeshFile(type="mesh-file", file=name, length_unit="mm"), tmp_path, "recipe")
     with refused(words):
         forms.read(tmp_path / name, 1.0)
 

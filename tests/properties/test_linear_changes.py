@@ -80,7 +80,7 @@ def test_forces_of_a_deep_tree_change_as_their_differences_say(driven: tuple[int
 def test_a_deep_tree_vibrates_as_with_its_mass_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
     table = Scene.model_validate(rods(16, plane=True))
     deep = analyses.frequencies(table, {}, silent).frequency.values
-    monkeypatch.setattr(modelling, "articulated", lambda numbering: False)
+    monkeypatch.setattr(modelling, "is_deep_tree", lambda numbering: False)
     shallow = analyses.frequencies(table, {}, silent).frequency.values
     assert deep == pytest.approx(shallow, rel=1e-9)
 

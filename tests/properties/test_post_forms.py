@@ -15,7 +15,7 @@ import pytest
 from flexclear.dynamics import analyses
 from flexclear.post.render import film_speed, forms, gl, joint_view, player, surfaces, vibrations
 from flexclear.post.render.forms import Seat, equivalent, wheels
-from flexclear.post.render.mechanism import Looks, Mechanism, mechanism, placed
+from flexclear.post.render.mechanism import Looks, Mechanism, drawn_points, mechanism
 from flexclear.post.render.pictures import MAKERS, Shown, make
 from flexclear.post.render.vibrations import Vibrations
 from flexclear.post.shapes.body_shape import AROUND, PER_CELL, surface
@@ -180,7 +180,7 @@ def test_the_viewer_bends_a_rod_as_the_run_does():
     q = run.modal_coordinate.values[step, rod.columns]
     fields = player.linear_fields(rod.bundle)
     points = rest - bundle.first_moment.values / float(bundle.mass) + np.tensordot(q, fields, axes=1)
-    true, _ = placed(run, rod, step)
+    true, _ = drawn_points(run, rod, step)
     own = true - run.position.values[step, rod.index]
     lengths = [np.linalg.norm(x.reshape(-1, AROUND + 1, 3).mean(axis=1), axis=1) for x in (points, own)]
     np.testing.assert_allclose(*lengths, atol=1e-9)
@@ -249,7 +249,7 @@ def test_a_joint_is_shown_in_space_with_its_gap_and_force(shown: Shown):
     assert max(force) <= float(run["contact_normal_force"].max()) * 1.001
     assert f"{name}: path of the centre" in page
     clearance = json.loads(run.attrs["parameters"])["joint"][name]["clearance"]
-    room = joint_view.shown(run, 0).room
+    room = joint_view.drawn_joint(run, 0).room
     np.testing.assert_allclose(np.linalg.norm(room.points, axis=1), clearance, rtol=1e-12)
 
 

@@ -12,7 +12,7 @@ from flexclear.artifacts.paths import PROJECT
 from flexclear.post.render import gl, gltf, player
 from flexclear.post.render.forms import equivalent
 from flexclear.post.render.layout import part_pose
-from flexclear.post.render.mechanism import Looks, mechanism, placed
+from flexclear.post.render.mechanism import Looks, drawn_points, mechanism
 from flexclear.post.render.panel import panel
 from flexclear.post.render.pictures import Shown, make
 from flexclear.post.render.player import _camera
@@ -169,7 +169,7 @@ def test_drawn_rod_lies_at_its_body_in_the_world():
     mass = float(bundle.mass)
     middle = xr.DataArray(mass * np.array([0.12, 0.0, 0.0]), dims="axis")
     drawn = mechanism(run, {"rod1": bundle.assign(first_moment=middle)})
-    points = placed(run, drawn.flexible[0], 0)[0].reshape(-1, AROUND + 1, 3)
+    points = drawn_points(run, drawn.flexible[0], 0)[0].reshape(-1, AROUND + 1, 3)
     rod = run.position.sel(body="rod1").values[0]
     np.testing.assert_allclose(points[1:-1, :-1].mean(axis=(0, 1)), rod, atol=1e-9)  # rings are even: mean = centre
 
@@ -249,7 +249,7 @@ def test_a_film_moves():
     drawn = mechanism(run, {"rod1": synthetic.bundle()})
     scene = film.plotter((200, 160))
     actors = film._build(scene, drawn)
-    film.look(scene, drawn)
+    film.place_camera(scene, drawn)
     last = run.sizes["time"] // 2
     seen = []
     for body in (replace(drawn, parts=()), replace(drawn, flexible=())):

@@ -12,8 +12,8 @@ from flexclear.numerics.rotations import (
     angle_about_y,
     quaternion_product,
     rotation_between,
+    rotation_since_start,
     rotation_vector_to_quaternion,
-    turning,
 )
 from flexclear.post.single_run.series import derive, horizon, spread
 from flexclear.scene.quantity import Quantity
@@ -63,7 +63,7 @@ def test_a_rotation_about_a_fixed_axis_is_drawn_with_its_sign_and_its_full_turns
     turns = np.column_stack([np.cos(0.5 * angle), np.outer(np.sin(0.5 * angle), axis)])
     turns[::3] *= -1.0  # which is the same rotation
     q = quaternion_product(turns, rotation_vector_to_quaternion(start))
-    found = turning(time, q, np.outer(rate + 2.1 * np.cos(7.0 * time), axis))
+    found = rotation_since_start(time, q, np.outer(rate + 2.1 * np.cos(7.0 * time), axis))
     assert found.axis is not None
     along = np.sign(np.dot(found.axis, axis))
     assert found.axis == pytest.approx(along * axis, abs=1e-7)  # rounding of the products over the smallest turn
@@ -73,7 +73,7 @@ def test_a_rotation_about_a_fixed_axis_is_drawn_with_its_sign_and_its_full_turns
 def test_the_axis_of_a_planar_motion_is_that_of_the_world():
     angle = np.linspace(0.0, -3.0, 31)
     q = np.column_stack([np.cos(0.5 * angle), np.zeros((31, 2)), np.sin(0.5 * angle)])
-    found = turning(np.linspace(0.0, 1.0, 31), q, np.tile([0.0, 0.0, -3.0], (31, 1)))
+    found = rotation_since_start(np.linspace(0.0, 1.0, 31), q, np.tile([0.0, 0.0, -3.0], (31, 1)))
     assert found.title == "rotation about z"
     assert found.angle == pytest.approx(angle, abs=1e-13)  # of an arc tangent and its unwrapping
 
@@ -82,7 +82,7 @@ def test_a_rotation_about_changing_axes_is_drawn_as_the_angle_from_the_start():
     time = np.linspace(0.0, 1.0, 201)
     vectors = np.column_stack([time, 0.5 * np.sin(3.0 * time), np.zeros_like(time)])
     q = np.array([rotation_vector_to_quaternion(v) for v in vectors])
-    found = turning(time, q, np.zeros((time.size, 3)))
+    found = rotation_since_start(time, q, np.zeros((time.size, 3)))
     assert found.axis is None
     assert found.title == "rotation from the start"
     assert found.angle == pytest.approx(rotation_between(q[:1], q), abs=1e-15)  # it is that function

@@ -10,10 +10,10 @@ from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.record.topology import topology
 from flexclear.dynamics.run.evaluation.observation import observe
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.run import engine_of, observed
+from flexclear.dynamics.run.run import engine_of, observe_run
 from flexclear.dynamics.run.run import integrate as whole
 from flexclear.dynamics.run.trajectory import integrate
-from flexclear.numerics.rotations import continued, matrix_to_quaternion, quaternion_to_matrix
+from flexclear.numerics.rotations import matrix_to_quaternion, quaternion_to_matrix, without_sign_jumps
 from flexclear.scene.load import load_scene
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
@@ -51,7 +51,7 @@ def test_closure_rows_may_be_chosen_twice_between_two_rows():
     chosen = ((begun, kept), (at, kept), (1.0001 * at, kept))
     twice = replace(run, trajectory=replace(run.trajectory, selections=chosen))
     assert [part.stop - part.start for part, _ in twice.trajectory.parts()] == [3, 0, len(run.trajectory.rows) - 3]
-    again = observed(run.engine, twice.trajectory)
+    again = observe_run(run.engine, twice.trajectory)
     assert np.array_equal(again.state[:3], run.observed.state[:3])
     assert np.array_equal(topology(twice)[0]["condition"][1], topology(run)[0]["condition"][1])
 
@@ -66,7 +66,7 @@ def test_bodies_and_frames_are_recorded_where_their_links_carry_them():
         for found, known in [*pairs, (seen.body_omega, body.omega), (seen.body_alpha, body.alpha)]:
             # sums of a few terms of their own size, in another order: rounding
             assert np.abs(found[:, k] - known).max() <= 1e-13 * max(1.0, np.abs(known).max())
-        turns = quaternion_to_matrix(continued(seen.body_quaternion)[:, k])
+        turns = quaternion_to_matrix(without_sign_jumps(seen.body_quaternion)[:, k])
         assert np.abs(turns - body.R).max() < 1e-13
     for k, (name, frame) in enumerate(model.mechanism.frames.items()):
         link = model.mechanism.link_of[frame.body]

@@ -12,7 +12,7 @@ from flexclear.dynamics.model import refill
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import Model, tabulate
-from flexclear.dynamics.model.refill import CHANGEABLE, refilled
+from flexclear.dynamics.model.refill import CHANGEABLE, refill_model
 from flexclear.scene.fields import Part
 from flexclear.scene.load import FAMILIES, edited, load_scene, with_numbers
 from flexclear.scene.schema import Scene
@@ -51,7 +51,7 @@ def test_a_refilled_model_is_the_same_to_the_last_bit(root: Path, name: str, cha
     other = with_numbers(scene, change)
     assert other == edited(scene, change)
     model, whole = tabulate(build(scene, {})), tabulate(build(other, {}))
-    found = refilled(model, other)
+    found = refill_model(model, other)
     assert (found is not None) == serves
     if found is None:
         return
@@ -107,14 +107,14 @@ def test_the_schema_is_known_by_its_keys() -> None:
 @pytest.mark.parametrize("table", Scene.model_fields)
 def test_what_is_not_listed_must_be_the_same(table: str) -> None:
     """Of every key of every model of parts, and of every table as a whole."""
-    assert refill._alike("other", "one", table) == (table in CHANGEABLE)
+    assert refill._differ_only_in_changeable("other", "one", table) == (table in CHANGEABLE)
     for owner, model, key in KEYS:
         if owner == table:
             was = model.model_construct(**dict.fromkeys(model.model_fields, 0.0))
             new = was.model_copy(update={key: 1.0})
             listed = table in CHANGEABLE or f"{table}.{key}" in CHANGEABLE
-            assert refill._alike({"part": new}, {"part": was}, table) == listed, (table, model, key)
-            assert not refill._alike({"other": was}, {"part": was}, table) or table in CHANGEABLE
+            assert refill._differ_only_in_changeable({"part": new}, {"part": was}, table) == listed, (table, model, key)
+            assert not refill._differ_only_in_changeable({"other": was}, {"part": was}, table) or table in CHANGEABLE
 
 
 #: rigid scenes that have between them every kind of part
@@ -165,7 +165,7 @@ def differing(root: Path, name: str, override: dict[str, Any] | None = None) -> 
     for change in edits(scene):
         try:
             other = edited(scene, change)
-            made = refilled(model, other)
+            made = refill_model(model, other)
         except InputError:
             continue
         if made is not None:

@@ -17,7 +17,7 @@ from flexclear.dynamics.contact.restitution import root
 from flexclear.dynamics.integrate.phi_functions import PHI_COUNT, phi_functions
 from flexclear.dynamics.model.index_tables import reverse_cuthill_mckee
 from flexclear.dynamics.model.interface_basis import _families
-from flexclear.numerics.rotations import cross, matrix_to_quaternion, quaternion_to_matrix, turned
+from flexclear.numerics.rotations import cross, matrix_to_quaternion, quaternion_to_matrix, rotate
 from tests.properties.kernels import from_python
 
 
@@ -67,9 +67,9 @@ def test_products_of_series_are_those_of_numpy(order: str) -> None:
     """In whatever order they are in memory, and one for many; what they give is one component after the other."""
     R, v, w = (np.array(series(*shape), order=order) for shape in ((50, 7, 3, 3), (50, 7, 3), (7, 3)))  # type: ignore[call-overload]
     assert np.array_equal(cross(v, w), np.cross(v, w))
-    np.testing.assert_allclose(turned(R, v), np.einsum("tbij,tbj->tbi", R, v), atol=ROUNDING)
-    np.testing.assert_allclose(turned(R[0], v), np.einsum("bij,tbj->tbi", R[0], v), atol=ROUNDING)
-    for found in (cross(v, w), turned(R, v)):
+    np.testing.assert_allclose(rotate(R, v), np.einsum("tbij,tbj->tbi", R, v), atol=ROUNDING)
+    np.testing.assert_allclose(rotate(R[0], v), np.einsum("bij,tbj->tbi", R[0], v), atol=ROUNDING)
+    for found in (cross(v, w), rotate(R, v)):
         assert found.flags.f_contiguous
 
 

@@ -24,7 +24,7 @@ from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.run import engine_of, observed
+from flexclear.dynamics.run.run import engine_of, observe_run
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.sensitivity.dataset import sensitivities
 from flexclear.dynamics.specialise import dual
@@ -59,7 +59,7 @@ def keep_independent(model: Model, h: np.ndarray, y: int, dy: int, w: np.ndarray
         return
     with suppress(ZeroDivisionError):  # by a pivot of dependent rows, after their Jacobian
         Trace(0).plain(kernel)(h.tolist(), model.arrays.f, w, n, y, dy)
-    J = selection.dense(model, h, w[h[m.JACOBIAN] :][: h[m.JACOBIAN_SIZE]])
+    J = selection.dense_rows(model, h, w[h[m.JACOBIAN] :][: h[m.JACOBIAN_SIZE]])
     kept, _ = selection.choose(J, np.ones(len(J)), mobility.rank)
     selection.write(model, h, kept)
 
@@ -182,7 +182,7 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pyte
             rates.append(closure_rows.evaluate(one, kernels.state[k], kernels.time[k]))
             one.h[m.EVALUATE] = before_it
         assert all(apart(alone.model, rates[0], other) < ROUNDING for other in rates[1:])
-    seen = [observed(one, kernels) for one in (general, alone)]
+    seen = [observe_run(one, kernels) for one in (general, alone)]
     for name in ("link_wrenches", "closure_wrenches", "drive_force", "energy"):
         a, b = (getattr(one, name) for one in seen)
         fields = a.dtype.names or [...]

@@ -162,7 +162,7 @@ def test_what_lies_within_an_effect_goes_with_it(crank: Path):
 
 def test_a_name_that_is_no_effect_is_refused_with_the_nearest(crank: Path):
     with pytest.raises(InputError, match=r"joint\.pin\.clearance"):
-        variants.named(load_scene(crank), ["joint.pin.clearence"], "plan")
+        variants.effects_by_name(load_scene(crank), ["joint.pin.clearence"], "plan")
 
 
 def test_the_variants_of_two_effects_are_the_square(crank: Path):

@@ -137,11 +137,11 @@ def test_differences_are_those_of_the_runs():
     ],
 )
 def test_a_value_is_written_to_the_second_digit_of_its_error(value: float, error: float, written: str):
-    assert curves.measured(value, error, "m") == written
+    assert curves.format_with_error(value, error, "m") == written
 
 
 def test_numbers_have_an_exponent_only_where_they_need_one():
-    assert [curves.rounded(v, 2) for v in (280.0, 99.96, 0.28, 2.1e-9, 3.14e8)] == [
+    assert [curves.format_to_digits(v, 2) for v in (280.0, 99.96, 0.28, 2.1e-9, 3.14e8)] == [
         "280",
         "100",
         "0.28",
@@ -190,4 +190,4 @@ def test_figures_of_any_run_and_a_page_with_all_inside():
     [(0.02, "m", (1e3, "mm")), (3e-6, "m", (1e6, "µm")), (0.0, "m", (1.0, "m")), (2500.0, "N", (1e-3, "kN"))],
 )
 def test_units_read_well(value: float, unit: str, expected: tuple[float, str]):
-    assert curves.scaled(value, unit) == expected
+    assert curves.readable_unit(value, unit) == expected

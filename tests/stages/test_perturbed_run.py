@@ -171,7 +171,7 @@ def test_of_a_twin_that_cannot_be_run_the_run_is_believed_nowhere(monkeypatch: p
 
     scene = check("bounce")
     expected = alone(scene, monkeypatch)
-    monkeypatch.setattr(horizon, "perturbed", refused)
+    monkeypatch.setattr(horizon, "perturbed_start", refused)
     for count in (1, 2):
         processors(monkeypatch, count)
         found = dynamics.simulate(scene, {}, silent)

@@ -68,7 +68,7 @@ def _with_error(hertz: float, fine: xr.Dataset, i: int) -> str:
 
 def euler_bernoulli_ratio() -> float:
     """Return the third over the second frequency of a uniform Euler-Bernoulli beam, both ends clamped or both free."""
-    _, second, third = closed_form.bending(closed_form.Span(1.0, 1.0, 1.0), "free-free", 3)
+    _, second, third = closed_form.bending_frequencies(closed_form.Span(1.0, 1.0, 1.0), "free-free", 3)
     return float(third / second)
 
 

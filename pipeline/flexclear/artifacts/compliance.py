@@ -54,10 +54,10 @@ def of_bundle(bundle: xr.Dataset) -> np.ndarray:
     rigid = np.block([[eye, arms], [np.zeros_like(arms), eye]])
     axes = np.zeros_like(rigid)
     axes[:, :3, :3] = axes[:, 3:, 3:] = np.swapaxes(R_BF, 1, 2)
-    return reduced(motion, axes @ rigid, _relief(bundle), bundle["modal_stiffness"].values)
+    return reduced(motion, axes @ rigid, _rigid_motions(bundle), bundle["modal_stiffness"].values)
 
 
-def _relief(bundle: xr.Dataset) -> np.ndarray:
+def _rigid_motions(bundle: xr.Dataset) -> np.ndarray:
     """Return the rigid motion in each shape, about the origin of the body frame, shape (6, n)."""
     mass, first, second = (bundle[name].values for name in ("mass", "first_moment", "second_moment"))
     inertia = np.trace(second) * np.eye(3) - second

@@ -78,7 +78,7 @@ def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body
     """
     used, names = list(dict.fromkeys(frames_used)), [str(name) for name in bundle["frame"].values]
     pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]]
-    if len(used) == 1 and used != _clamped(bundle):
+    if len(used) == 1 and used != _unmoved_frames(bundle):
         pairs = [(used[0], used[0])]
     messages = []
     directions = bundle["direction"].values
@@ -98,7 +98,7 @@ def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body
     return messages
 
 
-def _clamped(bundle: Labelled) -> list[str]:
+def _unmoved_frames(bundle: Labelled) -> list[str]:
     """Return the frames at which all shapes vanish."""
     moved = [np.abs(bundle[f"frame_{name}_shape"].values).max(axis=(1, 2)) for name in ("translation", "rotation")]
     still = np.all([size <= VANISHING * size.max() for size in moved], axis=0)

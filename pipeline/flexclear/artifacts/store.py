@@ -32,7 +32,7 @@ from flexclear.artifacts.disk import (
     temporary,
 )
 from flexclear.system import platforms
-from flexclear.system.errors import ResourceError, shown
+from flexclear.system.errors import ResourceError, terminal_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -156,7 +156,9 @@ class Store:
         try:
             return netcdf.read(content)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # the digest is right: it never was a dataset
-            raise ResourceError(f"{self.below(path)} is not a dataset ({shown(str(error))}); remove it") from None
+            raise ResourceError(
+                f"{self.below(path)} is not a dataset ({terminal_text(str(error))}); remove it"
+            ) from None
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Show the current artifact: read-only copies in `folder`, and its facts in ``folder/.facts``.

@@ -13,7 +13,7 @@ from flexclear.artifacts.paths import kernel_root
 from flexclear.dynamics.compile import files
 from flexclear.dynamics.compile.folder import prune
 from flexclear.stages.workplace import open_workplace
-from flexclear.system.errors import InputError, ResourceError, shown
+from flexclear.system.errors import InputError, ResourceError, terminal_text
 
 ACTIONS = {
     "size": "stored bytes by stage",
@@ -77,7 +77,7 @@ def _check(options: argparse.Namespace) -> None:
     in_results = maintenance.shown_faults(store, store.root)
     faults = [*inventory.damaged, *in_results, *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:LISTED_FAULTS]:
-        print(shown(fault))
+        print(terminal_text(fault))
     if len(faults) > LISTED_FAULTS:
         print(f"... and {len(faults) - LISTED_FAULTS} more")
     text = (
@@ -98,11 +98,11 @@ def _explain(options: argparse.Namespace) -> None:
         raise InputError(options.what, "is neither a shown file nor the beginning of a single key", "see results/runs")
     print(f"{record.stage} {record.key}")
     for name, digest in record.files.items():
-        print(shown(f"  holds {name}: sha256 {digest}"))
+        print(terminal_text(f"  holds {name}: sha256 {digest}"))
     for fact, value in record.computed_by.items():
-        print(shown(f"  computed by {fact}: {value}"))
+        print(terminal_text(f"  computed by {fact}: {value}"))
     for fact, value in record.facts.items():
-        print(shown(f"  {fact}: {value}"))
+        print(terminal_text(f"  {fact}: {value}"))
 
 
 def _prune(options: argparse.Namespace) -> None:

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 from flexclear.scene import lines
 from flexclear.scene.limits import Limits
 from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file
-from flexclear.scene.references import dangling
+from flexclear.scene.references import dangling_names
 from flexclear.scene.segments import body_frames, cut
 from flexclear.scene.toml_files import read_toml
-from flexclear.scene.variants import ideal, loose
+from flexclear.scene.variants import ideal, replaceable_contacts
 from flexclear.stages import meshing, modal_analysis, scenes, show, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options
@@ -90,9 +90,9 @@ def command(options: argparse.Namespace) -> int:
         print(json.dumps([*records, *(_record(warning, "warning") for warning in warnings.values())], indent=2))
     else:
         for warning in warnings.values():
-            print(f"flexclear: warning: {lines.located(warning)}", file=sys.stderr)
+            print(f"flexclear: warning: {lines.with_line_number(warning)}", file=sys.stderr)
         for mistake in errors.values():
-            text = lines.located(mistake) if isinstance(mistake, InputError) else mistake
+            text = lines.with_line_number(mistake) if isinstance(mistake, InputError) else mistake
             print(f"flexclear: {text}", file=sys.stderr)
         if len(errors) > 1:
             print(f"flexclear: {len(errors)} errors", file=sys.stderr)
@@ -147,7 +147,7 @@ def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
 
 
 def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
-    findings.attempt(lambda: refuse(dangling(cut(compose(path), str(path)), body_frames, str(path))))
+    findings.attempt(lambda: refuse(dangling_names(cut(compose(path), str(path)), body_frames, str(path))))
     loaded: list[Scene] = []
     findings.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
     # bodies may share a recipe, which is meshed once
@@ -324,9 +324,9 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
         with _as_mistakes():
             refuse_singular(model, mobility)
     else:
-        from flexclear.dynamics.model.assembly import assembled
+        from flexclear.dynamics.model.assembly import assemble
 
-        mechanism = assembled(mechanism)
+        mechanism = assemble(mechanism)
     exact = whole.start is None or whole.start.at != "equilibrium"
     refuse(start_errors(mechanism, final=exact))
     if mechanism.all_rigid and sound and exact and model.nv <= MOST_COORDINATES:
@@ -334,7 +334,7 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):
-        findings.warnings.append(lines.placed(InputError(place, text, remedy), whole.path))
+        findings.warnings.append(lines.with_file_name(InputError(place, text, remedy), whole.path))
     unused = unused_frames(mechanism)
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
@@ -366,7 +366,7 @@ def _starts_ideal(whole: Scene) -> bool:
 def _note_choice(whole: Scene, mechanism: Mechanism, findings: Findings) -> None:
     """Warn of a start that the scene does not choose; frames moved within their tolerance are no choice."""
     if "[start.joint." in mechanism.choice:
-        findings.warnings.append(lines.placed(InputError("[start]", mechanism.choice), whole.path))
+        findings.warnings.append(lines.with_file_name(InputError("[start]", mechanism.choice), whole.path))
 
 
 def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
@@ -386,7 +386,7 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings
     from flexclear.dynamics.model.mobility import analyse
     from flexclear.dynamics.model.model import tabulate
 
-    idealised = bool(loose(whole) or whole.flexible())
+    idealised = bool(replaceable_contacts(whole) or whole.flexible())
     try:
         model = tabulate(_mechanism(ideal(whole) if idealised else whole, rigid))
         free = analyse(model).mobility
@@ -394,5 +394,5 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings
         return
     if _starts_ideal(whole):
         _note_choice(whole, model.mechanism, findings)
-    closed = " with loose joints closed" if loose(whole) else ""
+    closed = " with loose joints closed" if replaceable_contacts(whole) else ""
     findings.notes.append(f"free motions in addition to the drives{closed}: {free}")

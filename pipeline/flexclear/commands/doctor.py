@@ -125,7 +125,7 @@ def command(options: argparse.Namespace) -> None:
             raise UnwellError("the run ends differently here")
         return
     if options.compile is not None:
-        names = compiled_for(options.compile, open_workplace())
+        names = compile_named_scenes(options.compile, open_workplace())
         print(f"compiled: all functions for runs of {', '.join(names)}; {_kernels()[0]}")
         return
     wrong = []
@@ -211,7 +211,7 @@ def _self_test() -> tuple[str, bool]:
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m instead of {expected:.12g} m", fine
 
 
-def compiled_for(names: list[str], workplace: Workplace) -> list[str]:
+def compile_named_scenes(names: list[str], workplace: Workplace) -> list[str]:
     """Compile, or fetch from the cache, all functions that runs of scenes call; return the scenes' names.
 
     Without names, scenes with the most common kinds of parts are compiled.  For an image, a cluster, or before a
@@ -219,13 +219,15 @@ def compiled_for(names: list[str], workplace: Workplace) -> list[str]:
     battery, be billed or killed by a scheduler, and write into a folder that a container is about to discard.
     """
     if names:
-        return _compiled(scenes.graphs(names), workplace)
+        return _compile_scenes(scenes.graphs(names), workplace)
     with tempfile.TemporaryDirectory() as folder:
         temporary = replace(workplace, store=Store(Path(folder) / "results"))
-        return _compiled(scenes.graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), temporary)
+        return _compile_scenes(
+            scenes.graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), temporary
+        )
 
 
-def _compiled(requested: Sequence[Graph], workplace: Workplace) -> list[str]:
+def _compile_scenes(requested: Sequence[Graph], workplace: Workplace) -> list[str]:
     workplace.datasets(*(task for graph in requested for task in graph.bodies().values()))
     workplace.monitor.start(len(requested))
     for graph in requested:

@@ -61,7 +61,7 @@ def command(options: argparse.Namespace) -> None:
     (graph,) = scenes.graphs([options.scene], options.set)
     time = scenes.moment(options.at)
     if options.speeds is not None:
-        diagram(graph.scene, time, options)
+        print_diagram(graph.scene, time, options)
         return
     if options.drive is not None:
         raise InputError("--drive", "belongs to a Campbell diagram", "add --speeds, e.g. 0:500rpm:50")
@@ -83,7 +83,7 @@ def _targets(options: argparse.Namespace, pictures: Sequence[str]) -> list[Path]
     return targets
 
 
-def diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> None:
+def print_diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> None:
     """Print the table of a Campbell diagram, and write its dataset and its picture."""
     given = speeds(options.speeds)
     targets = _targets(options, PICTURES)

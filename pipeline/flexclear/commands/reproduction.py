@@ -16,7 +16,7 @@ from typing import Any
 
 from flexclear.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.artifacts.paths import DATA, TREE, kernel_root, results_root
-from flexclear.scene.load import is_file, overridden
+from flexclear.scene.load import is_file, table_with_changes
 from flexclear.scene.toml_files import read_toml
 from flexclear.stages import meshing, scenes
 from flexclear.stages.sweeps.sweep_points import source_digest
@@ -119,7 +119,7 @@ def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], lis
     recipes: list[Path] = []
     for changed in (settings, ()):
         with contextlib.suppress(FlexclearError):
-            table = overridden(scene, scenes.overrides(changed))
+            table = table_with_changes(scene, scenes.overrides(changed))
             recipes += _named(table, "mesh")
             others += _named(table, "file")
     for path in recipes:

@@ -28,7 +28,7 @@ def command(options: argparse.Namespace) -> int:
         files, refused = shown(scene, quiet=options.quiet or options.json)
         made[scene.name] = [str(file) for file in files]
         if refused is not None:
-            print(f"flexclear: {lines.located(refused)}", file=sys.stderr)
+            print(f"flexclear: {lines.with_line_number(refused)}", file=sys.stderr)
             result = refused.exit_code
     if options.json:
         print(as_json(made))

@@ -10,7 +10,7 @@ from flexclear.stages import scenes
 from flexclear.stages.export import as_json
 from flexclear.stages.graph import STAGES
 from flexclear.stages.workplace import open_workplace
-from flexclear.system.errors import shown
+from flexclear.system.errors import terminal_text
 from flexclear.system.machine import instruction_set
 from flexclear.workflow.execute import states
 
@@ -44,8 +44,8 @@ def text(reasons: Mapping[str, Mapping[str, Sequence[str]]], others: Mapping[str
     """Return for each scene its stages, why each would run again, and notes on results of other instructions."""
     lines = []
     for scene, stages in reasons.items():
-        lines += [scene, *(f"  note: {shown(note)}" for note in others.get(scene, ()))]
+        lines += [scene, *(f"  note: {terminal_text(note)}" for note in others.get(scene, ()))]
         for label, why in stages.items():
-            first, *more = map(shown, why or ["fresh"])
+            first, *more = map(terminal_text, why or ["fresh"])
             lines += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in more)]
     return "\n".join(lines)

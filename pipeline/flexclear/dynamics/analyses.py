@@ -92,9 +92,9 @@ def equilibrium(
     Raises InputError for a scene that cannot be built, SolverError when no equilibrium is found.
     """
     from flexclear.dynamics.linear import dataset
-    from flexclear.dynamics.linear.equilibrium import balanced
+    from flexclear.dynamics.linear.equilibrium import bench_in_equilibrium
 
-    bench, rest, _ = balanced(scene, bundles, progress, time, drives, moving)
+    bench, rest, _ = bench_in_equilibrium(scene, bundles, progress, time, drives, moving)
     return dataset.equilibrium(bench, rest, moving)
 
 
@@ -108,10 +108,10 @@ def frequencies(
 ) -> xr.Dataset:
     """Return natural vibrations about `equilibrium`, which has the same arguments (schema LINEAR)."""
     from flexclear.dynamics.linear import dataset
-    from flexclear.dynamics.linear.equilibrium import balanced
+    from flexclear.dynamics.linear.equilibrium import bench_in_equilibrium
     from flexclear.dynamics.linear.vibrations import vibrations
 
-    bench, rest, small = balanced(scene, bundles, progress, time, drives, moving)
+    bench, rest, small = bench_in_equilibrium(scene, bundles, progress, time, drives, moving)
     return dataset.linear(bench, rest, small or vibrations(bench, rest.at), moving)
 
 
@@ -131,17 +131,17 @@ def state_space(
     """
     from flexclear.dynamics.linear import dataset
     from flexclear.dynamics.linear.bench import hold, state
-    from flexclear.dynamics.linear.equilibrium import balanced, newton
+    from flexclear.dynamics.linear.equilibrium import bench_in_equilibrium, newton
     from flexclear.dynamics.linear.state_space import require_continuous, state_space
-    from flexclear.dynamics.starts.snapshot import posed, released
+    from flexclear.dynamics.starts.snapshot import released, with_poses
 
     require_continuous(scene)
-    bench, rest, _ = balanced(scene, bundles, progress, time, drives)
+    bench, rest, _ = bench_in_equilibrium(scene, bundles, progress, time, drives)
     moved = {name: drive for name, drive in scene.drive.items() if hasattr(drive, "joint")}
     if moved and not held:
         forces = dataset.equilibrium(bench, rest, moving=False)["drive_force"]
         given = {name: float(forces.sel(drive=name)) for name in moved}
-        still = posed(scene, bench.engine, state(bench, rest.at.q), bench.time)
+        still = with_poses(scene, bench.engine, state(bench, rest.at.q), bench.time)
         bench, q = hold(released(still, given), bundles, progress, bench.time, {}, moving=False)
         rest = newton(bench, q)
     owners = bench.scene.owners()

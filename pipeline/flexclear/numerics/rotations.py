@@ -62,7 +62,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return out
 
 
-def turned(R: np.ndarray, v: np.ndarray) -> np.ndarray:
+def rotate(R: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return R v for arrays (..., 3, 3) and (..., 3), in Fortran order; see `cross`."""
     out = np.empty((*np.broadcast_shapes(R.shape[:-2], v.shape[:-1]), 3), order="F")
     for i in range(3):
@@ -92,7 +92,7 @@ def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
     return np.where(q[..., :1] >= 0.0, q, -q)
 
 
-def continued(q: np.ndarray) -> np.ndarray:
+def without_sign_jumps(q: np.ndarray) -> np.ndarray:
     """Return unit quaternions (time, ..., 4) without jumps of sign; the sign of the first one stays."""
     flips = np.einsum("t...i,t...i->t...", q[1:], q[:-1]) < 0.0
     if flips.any():
@@ -206,7 +206,7 @@ class Turning:
         return f"rotation about {along[0] if along else 'its axis'}"
 
 
-def turning(time: np.ndarray, quaternion: np.ndarray, angular_velocity: np.ndarray) -> Turning:
+def rotation_since_start(time: np.ndarray, quaternion: np.ndarray, angular_velocity: np.ndarray) -> Turning:
     """Return a body's rotation since the start at each time [s]; quaternion: w x y z, shape (time, 4).
 
     angular_velocity: world axes [rad/s], shape (time, 3); it determines the number of full turns between two rows.

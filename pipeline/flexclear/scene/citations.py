@@ -13,7 +13,7 @@ STRIPPED = 2
 _SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
-def cited(docstring: str | None) -> list[str]:
+def cited_sources(docstring: str | None) -> list[str]:
     r"""Return the sources that a docstring names, each on one line.
 
     >>> cited("A law.\n\nSource: Hertz (1881), Journal f. Math.\n92, 156-171.")

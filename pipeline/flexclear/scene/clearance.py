@@ -400,7 +400,7 @@ class _Bearing(Part):
     """constant normal force, added to the others"""
 
 
-def _rubbing(law: Any) -> Any:
+def _bearing_model(law: Any) -> Any:
     """Return a model with the parameters of a friction law and those of a bearing."""
     return create_model(f"{law.__name__}Bearing", __base__=(_Bearing, law), __doc__=law.__doc__, __module__=__name__)
 
@@ -408,7 +408,7 @@ def _rubbing(law: Any) -> Any:
 if TYPE_CHECKING:
     JointFriction: TypeAlias = Any
 else:
-    JointFriction = Annotated[Union[tuple(_rubbing(law) for law in FRICTIONS)], Field(discriminator="law")]  # noqa: UP007
+    JointFriction = Annotated[Union[tuple(_bearing_model(law) for law in FRICTIONS)], Field(discriminator="law")]  # noqa: UP007
 
 
 def require_fitting(kind: str, friction: Any) -> None:

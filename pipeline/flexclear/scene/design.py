@@ -69,43 +69,43 @@ def design(sweep: Sweep) -> Design:
     """Return the points of a sweep; repeated calls give the same points."""
     if sweep.sample is not None:
         fractions = _unit_points(sweep.sample, len(sweep.vary)).T
-        axes = [_sampled(sweep, name, fraction) for name, fraction in zip(sweep.vary, fractions, strict=True)]
+        axes = [_axis_of_fractions(sweep, name, fraction) for name, fraction in zip(sweep.vary, fractions, strict=True)]
         return Design(tuple(axes), grid=False)
-    return Design(tuple(_listed(sweep, name) for name in sweep.vary), grid=sweep.combine == "grid")
+    return Design(tuple(_axis_of_values(sweep, name) for name in sweep.vary), grid=sweep.combine == "grid")
 
 
-def _listed(sweep: Sweep, name: str) -> Axis:
+def _axis_of_values(sweep: Sweep, name: str) -> Axis:
     parameter = sweep.vary[name]
     if parameter.values is not None:
         units = {number_and_unit(v)[1] for v in parameter.values if _is_number(v)}
         unit = units.pop() if len(units) == 1 else ""
-        return Axis(name, sweep.places(name), parameter.values, unit, unit and _written(parameter.values[0]))
+        return Axis(name, sweep.places(name), parameter.values, unit, unit and _unit_as_written(parameter.values[0]))
     a, b = parameter.numbers("first", "last")
     spaced = np.geomspace if parameter.spacing == "log" else np.linspace
-    return _numbered(sweep, name, spaced(a, b, parameter.count or 2))
+    return _axis_of_numbers(sweep, name, spaced(a, b, parameter.count or 2))
 
 
-def _sampled(sweep: Sweep, name: str, fractions: np.ndarray) -> Axis:
+def _axis_of_fractions(sweep: Sweep, name: str, fractions: np.ndarray) -> Axis:
     """Return a parameter with the values below which its distribution has these fractions, shape (points,)."""
     parameter = sweep.vary[name]
     if parameter.mean is not None:
         from scipy.special import ndtri
 
         mean, deviation = parameter.numbers("mean", "deviation")
-        return _numbered(sweep, name, mean + deviation * ndtri(fractions))
+        return _axis_of_numbers(sweep, name, mean + deviation * ndtri(fractions))
     a, b = parameter.numbers("first", "last")
     log = parameter.spacing == "log"
-    return _numbered(sweep, name, a * (b / a) ** fractions if log else a + (b - a) * fractions)
+    return _axis_of_numbers(sweep, name, a * (b / a) ** fractions if log else a + (b - a) * fractions)
 
 
-def _numbered(sweep: Sweep, name: str, numbers: np.ndarray) -> Axis:
+def _axis_of_numbers(sweep: Sweep, name: str, numbers: np.ndarray) -> Axis:
     unit = sweep.vary[name].unit
     values = tuple(f"{x!r} {unit}" if unit else x for x in numbers.tolist())
     given = sweep.vary[name]
-    return Axis(name, sweep.places(name), values, unit, unit and _written(given.first or given.mean))
+    return Axis(name, sweep.places(name), values, unit, unit and _unit_as_written(given.first or given.mean))
 
 
-def _written(value: Value) -> str:
+def _unit_as_written(value: Value) -> str:
     """Return the unit with which a number was written."""
     return value.strip().partition(" ")[2].strip() if isinstance(value, str) else ""
 

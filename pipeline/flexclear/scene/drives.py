@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from flexclear.scene.fields import FrameName, OnCoordinate, Part, given
+from flexclear.scene.fields import FrameName, OnCoordinate, Part, given_keys
 from flexclear.scene.laws import Bare
 
 
@@ -28,7 +28,7 @@ class Components(Part):
 
     def laws(self) -> dict[str, Any]:
         """Return the given laws, by axis."""
-        return {axis: getattr(self, axis) for axis in given(self, ("x", "y", "z"))}
+        return {axis: getattr(self, axis) for axis in given_keys(self, ("x", "y", "z"))}
 
 
 class PathDrive(Part):

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError, WithJsonSche
 from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.drives import Drive, JointDrive, PathDrive
 from flexclear.scene.event_kinds import CHANGES
-from flexclear.scene.fields import Part, PartName, given, require_one
+from flexclear.scene.fields import Part, PartName, given_keys, require_one
 from flexclear.scene.formulas import formula
 from flexclear.scene.loads import Load, SampledPid
 from flexclear.scene.owners import COORDINATES
@@ -27,13 +27,13 @@ NAMED = {
 }
 
 
-def _at(value: Any) -> float | str:
+def _time_or_condition(value: Any) -> float | str:
     """Return a time [s], or the text of a comparison."""
     return value if isinstance(value, str) and ("<" in value or ">" in value) else quantity(value, "time")
 
 
 _WHEN = {"type": ["number", "string"], "description": "a time, or a comparison as 'force(A1) > 200 N'"}
-When = Annotated[float | str, BeforeValidator(_at), WithJsonSchema(_WHEN)]
+When = Annotated[float | str, BeforeValidator(_time_or_condition), WithJsonSchema(_WHEN)]
 
 
 class Event(Part):
@@ -63,7 +63,7 @@ class Event(Part):
     @property
     def kind(self) -> str:
         """The change in `CHANGES` that the event makes."""
-        return given(self, CHANGES)[0]
+        return given_keys(self, CHANGES)[0]
 
     @property
     def part(self) -> tuple[str, str]:
@@ -83,7 +83,7 @@ def _reader(family: str) -> Any:
     return TypeAdapter(Load if family == "load" else Drive)
 
 
-def switched(part: Any, event: Event) -> Any:
+def switched_part(part: Any, event: Event) -> Any:
     """Return the part that replaces another at an event; raise ValueError for impossible keys.
 
     A new part of the same type takes the other keys of the old one.
@@ -105,7 +105,7 @@ def with_switched(scene: Any) -> Any:
     for name, event in scene.event.items():
         if event.kind == "switch":
             family, part = event.part
-            new_parts.setdefault(family, {})[f"{part}.{name}"] = switched(getattr(scene, family)[part], event)
+            new_parts.setdefault(family, {})[f"{part}.{name}"] = switched_part(getattr(scene, family)[part], event)
     return scene.model_copy(update={family: {**getattr(scene, family), **parts} for family, parts in new_parts.items()})
 
 
@@ -142,9 +142,9 @@ def _problems(scene: Any, name: str, event: Event) -> Iterator[tuple[str, str]]:
     elif kind == "release" and family == "joint" and scene.joint[part].type == "free":
         yield kind, f"joint '{part}' is free already"
     elif kind == "lock":
-        yield from _of_lock(scene, name, scene.joint[part])
+        yield from _errors_of_lock(scene, name, scene.joint[part])
     elif kind == "switch":
-        yield from _of_switch(scene, getattr(scene, family)[part], event)
+        yield from _errors_of_switch(scene, getattr(scene, family)[part], event)
     for other in event.before:
         if other not in scene.event:
             yield "after", f"there is no event '{other}' ({suggestion(other, scene.event)})"
@@ -160,7 +160,7 @@ def _problems(scene: Any, name: str, event: Event) -> Iterator[tuple[str, str]]:
         yield "at", str(error)
 
 
-def _of_lock(scene: Any, name: str, joint: Any) -> Iterator[tuple[str, str]]:
+def _errors_of_lock(scene: Any, name: str, joint: Any) -> Iterator[tuple[str, str]]:
     if isinstance(joint, CONTACTS):
         yield "lock", "a joint with clearance has no coordinate to hold: lock an ideal joint"
     elif joint.type not in COORDINATES:
@@ -169,12 +169,12 @@ def _of_lock(scene: Any, name: str, joint: Any) -> Iterator[tuple[str, str]]:
         yield "", f"a drive has the name '{name}', under which the lock would be recorded: choose another name"
 
 
-def _of_switch(scene: Any, part: Any, event: Event) -> Iterator[tuple[str, str]]:
+def _errors_of_switch(scene: Any, part: Any, event: Event) -> Iterator[tuple[str, str]]:
     if isinstance(part, PathDrive):
         yield "switch", "is the path of a frame; drives of joints can be switched"
         return
     try:
-        new = switched(part, event)
+        new = switched_part(part, event)
         if event.part[0] == "load":
             formula(scene.model_copy(update={"load": {**scene.load, event.part[1]: new}}), event.part[1])
     except ValueError as error:

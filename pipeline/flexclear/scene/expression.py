@@ -24,7 +24,7 @@ SEVERAL = ("max", "min")
 BENT, JUMPING = ("max", "min", "abs"), ("sign", "step")
 #: operands of each operator
 OPERANDS = {**dict.fromkeys((*"+-*/^", *SEVERAL), 2), **dict.fromkeys(("minus", *FUNCTIONS), 1)}
-NUMBER, ANGLE = units.measured("1"), units.measured("rad")
+NUMBER, ANGLE = units.unit_exponents("1"), units.unit_exponents("rad")
 #: exponents of a unit (None for a bare zero, which fits any); dimension of the components; the value of a number
 Measure = tuple[units.Exponents | None, str, float | None]
 
@@ -70,7 +70,7 @@ def fold(
 
 def measure(steps: Sequence[Any]) -> tuple[units.Exponents, str]:
     """Return the exponents of the unit, and the dimension of the components; raise ValueError where units conflict."""
-    exponents, dim, _ = fold(steps, _measured, _combined)
+    exponents, dim, _ = fold(steps, _measure_of_leaf, _measure_of_operation)
     return exponents or NUMBER, dim
 
 
@@ -81,7 +81,7 @@ def with_name(text: str, name: str, other: str) -> str:
 
 def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) -> None:
     """Raise ValueError unless an expression is a number, or a vector, of this dimension; a bare zero fits any."""
-    exponents, dim, _ = fold(steps, _measured, _combined)
+    exponents, dim, _ = fold(steps, _measure_of_leaf, _measure_of_operation)
     if bool(dim) != vector:
         raise ValueError(
             "it is a number, but a vector is expected: give three components"
@@ -89,27 +89,27 @@ def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) ->
             else "it is a vector, but a number is expected: take a component, or norm(...)"
         )
     needed = units.exponents(dimension)
-    if exponents is not None and not _same(exponents, needed):
-        turned = "; rad is a unit: divide by 1 rad" if _same((*exponents[:3], 0.0), needed) else ""
+    if exponents is not None and not _same_units(exponents, needed):
+        turned = "; rad is a unit: divide by 1 rad" if _same_units((*exponents[:3], 0.0), needed) else ""
         raise ValueError(
             f"its value is in {units.si(exponents)}, but {units.a(dimension)} [{units.si(needed)}] is expected{turned}"
         )
 
 
-def _measured(leaf: Any) -> Measure:
+def _measure_of_leaf(leaf: Any) -> Measure:
     if not isinstance(leaf, tuple):
-        return units.measured(leaf.unit), leaf.dim, None
+        return units.unit_exponents(leaf.unit), leaf.dim, None
     value, unit = leaf
-    return None if value == 0.0 and unit == "1" else units.measured(unit), "", value
+    return None if value == 0.0 and unit == "1" else units.unit_exponents(unit), "", value
 
 
-def _combined(operator: Any, operands: list[Measure]) -> Measure:
+def _measure_of_operation(operator: Any, operands: list[Measure]) -> Measure:
     if isinstance(operator, Lookup):
         for unit, (exponents, dim, _) in zip(operator.of, operands, strict=True):
-            if dim or (exponents is not None and not _same(exponents, units.measured(unit))):
+            if dim or (exponents is not None and not _same_units(exponents, units.unit_exponents(unit))):
                 given = "a vector" if dim or exponents is None else f"a value in {units.si(exponents)}"
                 raise ValueError(f"table({operator.name}, ...) is over a value in {unit}, not {given}")
-        return units.measured(operator.value), "", None
+        return units.unit_exponents(operator.value), "", None
     (a, first, _), (b, second, number) = operands[0], operands[-1]
     if operator == "minus":
         return a, first, None
@@ -121,7 +121,7 @@ def _combined(operator: Any, operands: list[Measure]) -> Measure:
         sign = 1.0 if operator == "*" else -1.0
         return _sum(a or NUMBER, b or NUMBER, sign), first or second, None
     if operator in "+-" or operator in SEVERAL:
-        if a is not None and b is not None and not _same(a, b):
+        if a is not None and b is not None and not _same_units(a, b):
             verb = "added or subtracted" if operator in "+-" else "compared"
             raise ValueError(f"{units.si(a)} and {units.si(b)} cannot be {verb}; give numbers their unit")
         if first != second:
@@ -139,7 +139,7 @@ def _combined(operator: Any, operands: list[Measure]) -> Measure:
     if operator in ("abs", *SEVERAL):
         return a, "", None
     takes = {"exp": (NUMBER,), "log": (NUMBER,)}.get(operator, (NUMBER, ANGLE))
-    if operator not in ("sign", "step") and a is not None and not any(_same(a, one) for one in takes):
+    if operator not in ("sign", "step") and a is not None and not any(_same_units(a, one) for one in takes):
         raise ValueError(
             f"{operator}(...) takes a number{' or an angle' if ANGLE in takes else ''}, not a value in {units.si(a)}"
         )
@@ -151,7 +151,7 @@ def _sum(a: units.Exponents, b: units.Exponents, factor: float) -> units.Exponen
     return kg, m, s, rad
 
 
-def _same(a: units.Exponents | None, b: units.Exponents | None) -> bool:
+def _same_units(a: units.Exponents | None, b: units.Exponents | None) -> bool:
     return a is not None and b is not None and all(abs(x - y) < 1e-6 for x, y in zip(a, b, strict=True))
 
 
@@ -195,7 +195,7 @@ def postfix(
     try:
         return steps(ast.parse(" ".join(words), mode="eval").body)
     except (RecursionError, MemoryError):
-        raise ValueError(f"'{_shortened(text)}' is too long or too deeply nested") from None
+        raise ValueError(f"'{_shorten(text)}' is too long or too deeply nested") from None
     except SyntaxError:
         raise _misread(text) from None
 
@@ -227,7 +227,7 @@ def _as_python(text: str) -> tuple[list[str], list[re.Match[str]]]:
 def _leaf(token: re.Match[str], term: Callable[[str], Any], constants: Mapping[str, tuple[float, str]]) -> Any:
     if token["number"]:
         written = token["unit"]
-        factor, unit = (units.UNITS[written][0], units.si(units.measured(written))) if written else (1.0, "1")
+        factor, unit = (units.UNITS[written][0], units.si(units.unit_exponents(written))) if written else (1.0, "1")
         value = factor * float(token["number"])
         if not math.isfinite(value):
             raise ValueError(f"{token[0].strip()} is too large: the largest number is 1.8e308")
@@ -260,13 +260,13 @@ def _exponent(text: str, steps: list[Any]) -> tuple[float, str]:
     return fold(steps, lambda leaf: float(leaf[0]), _number), "1"
 
 
-def _shortened(text: str) -> str:
+def _shorten(text: str) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]} ..."
 
 
 def _misread(text: str) -> ValueError:
     return ValueError(
-        f"'{_shortened(text)}' is not a quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or combine "
+        f"'{_shorten(text)}' is not a quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or combine "
         "them with + - * / ^, parentheses, functions such as norm(...) and numbers with units, spaces around + and -"
     )
 

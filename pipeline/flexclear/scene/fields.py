@@ -182,14 +182,14 @@ class OnCoordinate(Part):
     """name of the joint's coordinate, if the joint has several"""
 
 
-def given(part: Part, keys: tuple[str, ...]) -> list[str]:
+def given_keys(part: Part, keys: tuple[str, ...]) -> list[str]:
     """Return those of the keys that a part has."""
     return [key for key in keys if getattr(part, key) is not None]
 
 
 def require_one(part: Part, keys: tuple[str, ...], says: str) -> None:
     """Raise ValueError unless a part has exactly one of these keys; says: their purpose, as "says where"."""
-    present = given(part, keys)
+    present = given_keys(part, keys)
     if len(present) != 1:
         text = f"{' and '.join(present)} do" if present else "nothing does"
         raise ValueError(f"one of {', '.join(keys)} {says}; here {text}")
@@ -197,7 +197,7 @@ def require_one(part: Part, keys: tuple[str, ...], says: str) -> None:
 
 def given_once(part: Part, ways: tuple[str, ...]) -> None:
     """Raise ValueError when an orientation is given in more than one of these ways."""
-    if len(present := given(part, ways)) > 1:
+    if len(present := given_keys(part, ways)) > 1:
         raise ValueError(f"give an orientation once, not by {' and '.join(present)}")
 
 

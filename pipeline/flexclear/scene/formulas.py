@@ -27,9 +27,9 @@ from flexclear.scene.expression import (
 from flexclear.scene.loads import EXPRESSIONS, JointExpression, LineExpression, PointExpression
 from flexclear.scene.owners import turns
 from flexclear.scene.parts import FlexibleBody
-from flexclear.scene.quantity import KINDS, Quantity, read
+from flexclear.scene.quantity import KINDS, Quantity, read_expression
 from flexclear.scene.tables import LookupTable
-from flexclear.scene.units import measured, si
+from flexclear.scene.units import si, unit_exponents
 
 #: quantities that follow from positions and velocities: letter of their leaves
 READ = {
@@ -96,7 +96,7 @@ def formula(scene: Any, name: str) -> Formula | None:
     dimension = "torque" if isinstance(load, JointExpression) and turns(scene, load) else "force"
     vector = isinstance(load, PointExpression) and isinstance(load.force, str)
     numbers, reads, codes = list[float](), list[tuple[str, str]](), list[str]()
-    for text, steps in written(scene, load):
+    for text, steps in expressions_of_load(scene, load):
         try:
             measure(steps)
             for step in steps:
@@ -104,11 +104,11 @@ def formula(scene: Any, name: str) -> Formula | None:
             check_unit(steps, dimension, vector=vector)
         except ValueError as error:
             raise ValueError(f"force = '{text}': {error}") from None
-        codes.append(_encoded(steps, numbers, reads, load.tables))
+        codes.append(_encode(steps, numbers, reads, load.tables))
     return Formula(" ; ".join(codes), tuple(numbers), tuple(reads), tuple(load.tables.values()))
 
 
-def written(scene: Any, load: Any) -> Iterator[tuple[str, list[Any]]]:
+def expressions_of_load(scene: Any, load: Any) -> Iterator[tuple[str, list[Any]]]:
     """Yield each expression of a load, and its postfix order; raise ValueError, in words, for one without meaning."""
     known, local = constants_of(load.values), OF_LINES if isinstance(load, LineExpression) else None
     require_used(known, load.texts)
@@ -116,13 +116,13 @@ def written(scene: Any, load: Any) -> Iterator[tuple[str, list[Any]]]:
     tables = {name: _lookup(name, one) for name, one in load.tables.items()}
     for text in load.texts:
         try:
-            yield text, read(text, scene.owners(), known, local, tables)
+            yield text, read_expression(text, scene.owners(), known, local, tables)
         except ValueError as error:
             raise ValueError(f"force = '{text}': {error}") from None
 
 
 def _lookup(name: str, one: LookupTable) -> Lookup:
-    of, value = [si(measured(column.unit)) for column in one.of], si(measured(one.value.unit))
+    of, value = [si(unit_exponents(column.unit)) for column in one.of], si(unit_exponents(one.value.unit))
     return Lookup(name, tuple(of), value)
 
 
@@ -174,7 +174,7 @@ def _check(scene: Any, step: Any) -> None:
         raise ValueError(f"'{step.name}' belongs to a flexible body: use the frame_position of one of its frames")
 
 
-def _encoded(
+def _encode(
     steps: list[Any], numbers: list[float], reads: list[tuple[str, str]], tables: Mapping[str, LookupTable]
 ) -> str:
     def leaf(step: Any) -> str:

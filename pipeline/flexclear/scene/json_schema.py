@@ -39,7 +39,7 @@ def scene_schema() -> dict[str, Any]:
         "if": {"not": {"required": ["extends"]}},
         "then": {"required": required, **{"properties": dict.fromkeys(("replace", "set", "remove"), False)}},
     }
-    return identified(schema, "scene")
+    return with_identity(schema, "scene")
 
 
 def sweep_schema() -> dict[str, Any]:
@@ -47,10 +47,10 @@ def sweep_schema() -> dict[str, Any]:
     schema = Sweep.model_json_schema(mode="validation", by_alias=True)
     vary = schema["properties"]["vary"]
     vary["additionalProperties"] = {"anyOf": [vary["additionalProperties"], {"type": "array", "minItems": 1}]}
-    return identified(schema, "sweep")
+    return with_identity(schema, "sweep")
 
 
-def identified(schema: dict[str, Any], kind: str) -> dict[str, Any]:
+def with_identity(schema: dict[str, Any], kind: str) -> dict[str, Any]:
     """Return the schema with its dialect and name."""
     return {"$schema": DIALECT, "$id": f"urn:flexclear:schema:{kind}", **schema}
 

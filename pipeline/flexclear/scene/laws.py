@@ -19,12 +19,12 @@ _TEXT = {"type": ["number", "string"], "description": "SI number, or text with a
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
 
 
-def _listed(value: Any) -> Any:
+def _as_list(value: Any) -> Any:
     """Return a single entry, written without brackets, as a list."""
     return [value] if isinstance(value, (int, float, str)) else value
 
 
-_LIST = BeforeValidator(_listed, json_schema_input_type=float | str | tuple[float | str, ...])
+_LIST = BeforeValidator(_as_list, json_schema_input_type=float | str | tuple[float | str, ...])
 Values: TypeAlias = Annotated[tuple[Value, ...], _LIST]
 Times: TypeAlias = Annotated[tuple[Time, ...], _LIST]
 

@@ -23,10 +23,10 @@ _PLACE = re.compile(r"^(?P<file>.+\.toml) \[(?P<keys>[^\[\]]+)\]$")
 EDITS: tuple[tuple[str, ...], ...] = ((), ("replace",), ("set",))
 
 
-def located(error: InputError) -> InputError:
+def with_line_number(error: InputError) -> InputError:
     """Return the error with the line behind its key path, where a file contains the path; for several errors, each."""
     if isinstance(error, InputErrors):
-        return InputErrors([located(one) for one in error.errors])
+        return InputErrors([with_line_number(one) for one in error.errors])
     position = where(error)
     if position is None:
         return error
@@ -36,10 +36,10 @@ def located(error: InputError) -> InputError:
     return InputError(f"{error.place}, line {line}{other}", error.problem, error.remedy)
 
 
-def placed(error: InputError, path: Path | None) -> InputError:
+def with_file_name(error: InputError, path: Path | None) -> InputError:
     """Return an error with the file before its place, where that is only a part of the file."""
     if isinstance(error, InputErrors):
-        return InputErrors([placed(one, path) for one in error.errors])
+        return InputErrors([with_file_name(one, path) for one in error.errors])
     if path is None or not error.place.startswith("["):
         return error
     return InputError(f"{path} {error.place}", error.problem, error.remedy)
@@ -55,7 +55,7 @@ def where(error: InputError) -> tuple[Path, int] | None:
 
 def _position(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[Path, int] | None:
     try:
-        extends, lines = _read(file.read_text(encoding="utf-8-sig"))
+        extends, lines = _base_and_lines(file.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return None
     # of a path inside a part, the longest beginning that is written out, down to the part itself
@@ -71,12 +71,12 @@ def _position(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tup
 
 
 @lru_cache(maxsize=16)
-def _read(text: str) -> tuple[object, dict[tuple[str, ...], int]]:
+def _base_and_lines(text: str) -> tuple[object, dict[tuple[str, ...], int]]:
     """Return the scene that a text extends, and the lines of its keys; cached, since one text may have many errors."""
-    return tomllib.loads(text).get("extends"), written(text)
+    return tomllib.loads(text).get("extends"), lines_of_keys(text)
 
 
-def written(text: str) -> dict[tuple[str, ...], int]:
+def lines_of_keys(text: str) -> dict[tuple[str, ...], int]:
     """Return the line on which each key of a TOML text is first written, tables included."""
     lines_of: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
@@ -137,7 +137,7 @@ def _common_error(line: str) -> tuple[str, str] | None:
             f"a quotation mark is missing: {bare}",
             'put text and quantities with units between two quotation marks: "1 mm"',
         )
-    quoted = _quoted(line) if len(line) <= LONGEST_MENDED else line
+    quoted = _quote_quantities(line) if len(line) <= LONGEST_MENDED else line
     if quoted != line:
         return f"a quantity with a unit needs quotation marks: {bare}", f"write {quoted.strip()}"
     if value and re.fullmatch(r"[-+]?\d+,\d+", value[2]):
@@ -176,7 +176,7 @@ def _odd_name(line: str) -> bool:
     return bool(re.match(r"\s*\[[^\]\"']*[^\]\"'\x00-\x7f]", line))
 
 
-def _quoted(line: str) -> str:
+def _quote_quantities(line: str) -> str:
     """Return the line with its quantities in quotation marks."""
 
     def mended(part: re.Match[str]) -> str:

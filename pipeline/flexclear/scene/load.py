@@ -21,7 +21,7 @@ from flexclear.scene.solver import close_choice
 from flexclear.scene.toml_files import read_toml
 from flexclear.scene.units import any_quantity
 from flexclear.scene.validation_errors import input_errors
-from flexclear.system.errors import InputError, ResourceError, shown
+from flexclear.system.errors import InputError, ResourceError, terminal_text
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
@@ -54,19 +54,19 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     """
     path = Path(path)
     name = scene_name(path)
-    table = overridden(path, override or {})
+    table = table_with_changes(path, override or {})
     check_parts(table, path, FAMILIES)
-    scene = _read(table, path)
+    scene = _validate_scene(table, path)
     scene._name = name
     scene._path = path
     return scene
 
 
-def overridden(path: Path, override: Mapping[str, object]) -> dict[str, Any]:
+def table_with_changes(path: Path, override: Mapping[str, object]) -> dict[str, Any]:
     """Return the plain table of a scene file (`compose`) with these values changed; files by their full paths."""
     table = compose(path)
     for where, value in override.items():
-        _put(table, where, value, f"override of {path}")
+        _set_value(table, where, value, f"override of {path}")
     _absolute_files(table, path)
     return table
 
@@ -83,9 +83,9 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
         raise InputError("scene", "edits another scene, which only files can do", "use edited(scene, changes)")
     _absolute_files(copied, Path.cwd() / origin)
     for key, value in (override or {}).items():
-        _put(copied, key, value, "override of scene")
+        _set_value(copied, key, value, "override of scene")
     check_parts(copied, origin, FAMILIES)
-    scene = _read(copied, origin)
+    scene = _validate_scene(copied, origin)
     scene._name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     return scene
 
@@ -101,19 +101,19 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
     table = copy.deepcopy(whole or scene.model_dump(mode="json", exclude_none=True))
     for where, value in override.items():
         if value is not None:
-            _put(table, where, value, f"edit of {scene.name}")
+            _set_value(table, where, value, f"edit of {scene.name}")
         elif "." in where:
             owner, last = _find(table, where, f"edit of {scene.name}")
             del owner[last]
         else:
             table.pop(where, None)
     _absolute_files(table, scene._path or Path.cwd() / "scene")
-    result = _read(table, Path(scene.name))
+    result = _validate_scene(table, Path(scene.name))
     result._name, result._path = scene._name, scene._path
     return result
 
 
-def _read(table: dict[str, Any], where: Path) -> Scene:
+def _validate_scene(table: dict[str, Any], where: Path) -> Scene:
     """Return the scene in a table; validation errors, and requests beyond `[limits]`, are reported with this path."""
     try:
         scene = Scene.model_validate(pieces := cut(table, str(where)))
@@ -148,7 +148,7 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
         table = part.model_dump(mode="json", exclude_none=True)
         try:
             for key, value in values.items():
-                _put(table, key, value, "")
+                _set_value(table, key, value, "")
             if family == "solver":
                 close_choice(table, values)
             read = _reader(family).validate_python({name: table} if name else table)
@@ -181,7 +181,7 @@ def number_in(table: Mapping[str, Any], path: str, where: str) -> tuple[float, s
 def with_number(table: Mapping[str, Any], path: str, value: object) -> dict[str, Any]:
     """Return a copy of a table with the value at a key path changed."""
     changed = copy.deepcopy(dict(table))
-    _put(changed, path, value, path)
+    _set_value(changed, path, value, path)
     return changed
 
 
@@ -200,7 +200,9 @@ def scene_name(path: Path) -> str:
     """
     whole = _resolved(path).with_suffix("")
     if not whole.name.strip(".") or not whole.name.isprintable():
-        raise InputError(shown(str(path)), "cannot name a scene: results go into a folder of that name", "rename it")
+        raise InputError(
+            terminal_text(str(path)), "cannot name a scene: results go into a folder of that name", "rename it"
+        )
     if "scenes" in whole.parts[:-1]:
         last = len(whole.parts) - 1 - whole.parts[::-1].index("scenes")
         parts = whole.parts[last + 1 :]
@@ -246,7 +248,7 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
         raise InputError(
             f"{path} [extends]", f"is the name of one file, not {table['extends']!r}", 'write "other.toml"'
         )
-    return _edited(compose(path.parent / table["extends"], (*above, path)), table, path)
+    return _apply_edits(compose(path.parent / table["extends"], (*above, path)), table, path)
 
 
 def _require_tables(table: dict[str, Any], path: Path) -> None:
@@ -286,7 +288,7 @@ def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
         raise InputError(str(path), f"is {kind}, not {requested}", USE[kind].format(path=path))
 
 
-def _edited(result: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str, Any]:
+def _apply_edits(result: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str, Any]:
     """Apply a table's edits to the table that it extends, in place, and return that."""
     for where in table.get("remove", []):
         parent, key = _find(result, where, f"{path} [remove]")
@@ -320,15 +322,15 @@ def _edit_family(result: dict[str, Any], family: str, parts: object, edit: str, 
             raise InputError(
                 f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, existing)
             )
-        existing[name] = part if edit == "replace" else _merged(existing[name], part)
+        existing[name] = part if edit == "replace" else _merge(existing[name], part)
 
 
-def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+def _merge(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
     """Return `old` with the named keys changed, tables key by key."""
     result = dict(old)
     for key, value in new.items():
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
-        result[key] = _merged(result[key], value) if both else value
+        result[key] = _merge(result[key], value) if both else value
     return result
 
 
@@ -366,7 +368,7 @@ def _entry(table: Any, name: str) -> str | int | None:
     return int(name) if isinstance(table, list) and name.isdecimal() and int(name) < len(table) else None
 
 
-def _put(table: dict[str, Any], path: str, value: object, where: str) -> None:
+def _set_value(table: dict[str, Any], path: str, value: object, where: str) -> None:
     parent, _, key = path.rpartition(".")
     if parent in SETTINGS:
         table.setdefault(parent, {})

@@ -42,7 +42,7 @@ def _matrix(value: Any, what: str, dimensions: tuple[str, str, str], symmetric: 
     if [len(row) if isinstance(row, (list, tuple)) else 0 for row in given] != [6] * 6:
         raise ValueError(f"a {what} is [x, y, z, rx, ry, rz] or a 6x6 matrix in that order")
     rows = [[_entry(given[i][j], dimensions[(i > 2) + (j > 2)]) for j in range(6)] for i in range(6)]
-    return _checked(rows, what) if symmetric else tuple(map(tuple, rows))
+    return _symmetric_matrix(rows, what) if symmetric else tuple(map(tuple, rows))
 
 
 def _entry(value: Any, dimension: str) -> float:
@@ -59,7 +59,7 @@ def _entry(value: Any, dimension: str) -> float:
             raise error from None
 
 
-def _checked(rows: list[list[float]], what: str) -> Matrix:
+def _symmetric_matrix(rows: list[list[float]], what: str) -> Matrix:
     """Return the matrix made exactly symmetric; raise ValueError unless symmetric and positive semidefinite."""
     sizes = [math.sqrt(abs(rows[k][k])) for k in range(6)]
     for j, i in combinations(range(6), 2):

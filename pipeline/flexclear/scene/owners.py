@@ -42,7 +42,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         "coordinate": _coordinates(scene),
         "drive": dict(_drives(scene)),
         "controller": {name: turns(scene, load) for name, load in controllers.items()},
-        "gear": {name: _named(scene, gear.second) for name, gear in scene.gear.items()},
+        "gear": {name: _is_angle(scene, gear.second) for name, gear in scene.gear.items()},
         "load": {name: _measures_angle(scene, load) for name, load in forces.items()},
         "bushing": _still(name for name, load in forces.items() if isinstance(load, Bushing)),
         "contact": _still(contacts) | stops,
@@ -51,7 +51,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         "mode": _still(f"{n}.{k}" for n, c in modes.items() if isinstance(c, int) for k in range(1, c + 1)),
         "section": _still(scene.output.stress or ()),
         "gauge": _still(n for body in scene.output.stress or () for n in (body, *scene.output.gauge_names(body))),
-        "": _still(_of_all(scene)),
+        "": _still(_names_of_all(scene)),
     }
 
 
@@ -59,7 +59,7 @@ def _still(names: Any) -> dict[str, bool]:
     return dict.fromkeys(names, False)
 
 
-def _of_all(scene: Any) -> Iterator[str]:
+def _names_of_all(scene: Any) -> Iterator[str]:
     for key, kind in KINDS.items():
         possible = (key not in _OF_LOADS or scene.forces()) and (key not in _OF_MODES or scene.flexible())
         if kind.owner == "" and kind.variable and possible:
@@ -108,10 +108,10 @@ def _drives(scene: Any) -> Iterator[tuple[str, bool]]:
             yield name, turns(scene, drive)
     for name, event in scene.event.items():
         if event.kind == "lock":
-            yield from ((held, turning) for held, (_, turning) in locked(scene, name, event).items())
+            yield from ((held, turning) for held, (_, turning) in locked_coordinates(scene, name, event).items())
 
 
-def locked(scene: Any, name: str, event: Any) -> dict[str, tuple[str, bool]]:
+def locked_coordinates(scene: Any, name: str, event: Any) -> dict[str, tuple[str, bool]]:
     """Return the coordinates that a lock called `name` holds: name of the drive -> coordinate, and whether an angle."""
     joint = scene.joint.get(event.part[1])
     known = COORDINATES.get(joint.type, {}) if joint is not None else {}
@@ -125,7 +125,7 @@ def turns(scene: Any, part: Any) -> bool:
     return known.get(part.coordinate or next(iter(known), ""), False)
 
 
-def _named(scene: Any, text: str) -> bool:
+def _is_angle(scene: Any, text: str) -> bool:
     """Return True when the coordinate ``A`` or ``A.rotation`` is an angle."""
     known = _coordinates(scene)
     return known.get(text, known.get(text.partition(".")[0], False))
@@ -133,5 +133,5 @@ def _named(scene: Any, text: str) -> bool:
 
 def _measures_angle(scene: Any, load: Any) -> bool:
     if getattr(load, "measured", None):
-        return _named(scene, load.measured)
+        return _is_angle(scene, load.measured)
     return hasattr(load, "joint") and turns(scene, load)

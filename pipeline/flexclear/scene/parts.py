@@ -23,7 +23,7 @@ from flexclear.scene.fields import (
     Positive,
     Time,
     Velocity,
-    given,
+    given_keys,
     require_one,
 )
 from flexclear.scene.laws import Value
@@ -361,7 +361,7 @@ class Stop(OnCoordinate):
     @property
     def ends(self) -> tuple[str, ...]:
         """Names of the given ends."""
-        return tuple(given(self, ("lower", "upper")))
+        return tuple(given_keys(self, ("lower", "upper")))
 
 
 class Gear(Part):

@@ -40,7 +40,7 @@ def _below(where: str, key: str) -> str:
     return f"{where}.{key}" if where else key
 
 
-def assumed(sources: dict[str, str]) -> dict[str, str]:
+def assumed_values(sources: dict[str, str]) -> dict[str, str]:
     """Return the sources of the form ``assumed: why``."""
     return {where: text for where, text in sources.items() if text.startswith("assumed")}
 

@@ -140,7 +140,7 @@ class Quantity:
         if not self.steps:
             return KINDS[self.kind].units[self.turns]
         measured = measure(self.steps)[0]
-        return next((t.unit for t in self.terms() if units.measured(t.unit) == measured), units.si(measured))
+        return next((t.unit for t in self.terms() if units.unit_exponents(t.unit) == measured), units.si(measured))
 
     @property
     def dim(self) -> str:
@@ -166,7 +166,7 @@ class Quantity:
         return all((term.owner or term.kind) in owners.get(KINDS[term.kind].owner, ()) for term in self.terms())
 
     def written(self) -> list[Any]:
-        """Return the quantity as JSON, which `read` parses."""
+        """Return the quantity as JSON, which `read_expression` parses."""
         steps = [step.written() if isinstance(step, Quantity) else step for step in self.steps]
         return [self.owner, self.kind, self.component, self.turns, self.text, steps]
 
@@ -197,7 +197,7 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     if _PLAIN.fullmatch(plain):
         quantity = _term(plain, owners)
     else:
-        quantity = Quantity("", EXPRESSION, steps=tuple(read(plain, owners)))
+        quantity = Quantity("", EXPRESSION, steps=tuple(read_expression(plain, owners)))
         if not quantity.terms():
             raise ValueError(f"'{text}' is a number, not a quantity")
         _ = quantity.dim
@@ -223,11 +223,11 @@ def condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
 
 def _magnitude(text: str, owners: Mapping[str, Collection[str]]) -> list[Any]:
     """Return one side of a comparison in postfix order, a vector as its magnitude."""
-    steps = read(text, owners)
+    steps = read_expression(text, owners)
     return [*steps, "norm"] if measure(steps)[1] else steps
 
 
-def read(
+def read_expression(
     text: str,
     owners: Mapping[str, Collection[str]],
     constants: Mapping[str, tuple[float, str]] | None = None,
@@ -292,7 +292,7 @@ def _nearest(owner: str, word: str, owners: Mapping[str, Collection[str]]) -> st
     return suggestion("", list(pieces.values()) or [f"{o}.{w}".lstrip(".") for o, w in every])
 
 
-def usual(joints: Mapping[str, Collection[str]], contacts: Collection[str]) -> list[Quantity]:
+def default_quantities(joints: Mapping[str, Collection[str]], contacts: Collection[str]) -> list[Quantity]:
     """Return default quantities of a scene: motion of the body with most joints, a reaction, and the contacts.
 
     joints: the bodies that each joint connects, in the scene's order; contacts: the joints with clearance.

@@ -22,14 +22,14 @@ FRAMES = (("joint", "between"), ("load", "between"), ("drive", "frame"), ("load"
 JOINTS = (*product(("drive", "load", "stop"), ("joint", "actuators")), ("gear", "first"), ("gear", "second"))
 
 
-def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:
+def dangling_names(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:
     """Return an error for every name in a composed scene table that does not exist; `path` opens each location."""
     frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
     joints = [name for name, _ in _tables(table.get("joint"))]
     errors: list[InputError] = []
-    for where, name in _named(table, FRAMES):
+    for where, name in _references(table, FRAMES):
         errors += _frame(f"{path} [{where}]", name, frames)
-    for where, text in _named(table, JOINTS):
+    for where, text in _references(table, JOINTS):
         name = text if where.endswith(".joint") else text.partition(".")[0]
         if name not in joints:
             errors.append(InputError(f"{path} [{where}]", f"there is no joint '{name}'", suggestion(name, joints)))
@@ -97,7 +97,7 @@ def _texts(value: object) -> list[str]:
     return [name for name in values if isinstance(name, str)]
 
 
-def _named(table: Mapping[str, Any], keys: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+def _references(table: Mapping[str, Any], keys: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
     for family, key in keys:
         for name, part in _tables(table.get(family)):
             yield from ((f"{family}.{name}.{key}", text) for text in _texts(part.get(key)))

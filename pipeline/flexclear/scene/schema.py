@@ -27,10 +27,10 @@ from flexclear.scene.parts import (
     RigidBody,
     Stop,
 )
-from flexclear.scene.quantity import Quantity, parse, usual
+from flexclear.scene.quantity import Quantity, default_quantities, parse
 from flexclear.scene.solver import NAMING, Solver
 from flexclear.scene.start import Start
-from flexclear.scene.units import any_quantity, measured, quantity
+from flexclear.scene.units import any_quantity, quantity, unit_exponents
 
 #: types of joints with one freedom: driving it determines the whole relative motion
 SINGLE = ("revolute", "prismatic")
@@ -237,7 +237,7 @@ class Scene(Part):
             try:
                 one = parse(name, known)
                 written = self.accuracy.quantities[name].unit if self.accuracy and where == "accuracy." else None
-                if written is not None and measured(written) != measured(one.unit):
+                if written is not None and unit_exponents(written) != unit_exponents(one.unit):
                     raise ValueError(f"the accuracy is in {written}, but the quantity is in {one.unit}")
             except ValueError as error:
                 raise ValueError(f"{where}{name}: {error}") from None
@@ -306,7 +306,7 @@ class Scene(Part):
         known = self._prescribed()
         pairs = {n: [hosts[b] for b in pair] for n, pair in joints.items()}
         free = {n: [b for b in pair if b not in known] for n, pair in pairs.items()}
-        chosen = usual(free if any(free.values()) else pairs, tuple([*self.contacts(), *self.stop_ends()]))
+        chosen = default_quantities(free if any(free.values()) else pairs, tuple([*self.contacts(), *self.stop_ends()]))
         return [parse(one.name, self.owners()) for one in chosen]
 
     def _prescribed(self) -> set[str]:
@@ -433,4 +433,4 @@ class Scene(Part):
 
     def assumptions(self) -> dict[str, str]:
         """Return the sources of the form ``assumed: why``."""
-        return provenance.assumed(self.sources())
+        return provenance.assumed_values(self.sources())

@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from flexclear.scene.fields import Number, OnCoordinate, Part, PartName, Time, given
+from flexclear.scene.fields import Number, OnCoordinate, Part, PartName, Time, given_keys
 from flexclear.scene.recorded_start import read_row
 from flexclear.scene.units import quantity
 
@@ -37,7 +37,7 @@ class JointStart(Part):
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if not given(self, KEYS):
+        if not given_keys(self, KEYS):
             raise ValueError(f"one of {', '.join(KEYS)} must give the start of the coordinate; none is given")
         if self.position is not None and self.near is not None:
             raise ValueError("position is the exact start of the coordinate, near an approximate one; give one of them")

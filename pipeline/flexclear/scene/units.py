@@ -108,7 +108,7 @@ def unit(text: str) -> tuple[float, str] | None:
 
     Units after a slash divide; powers are written ``^2``, factors separated by spaces, dots or stars.
     """
-    text = _plain(text)
+    text = _plain_spelling(text)
     if text in UNITS:
         return UNITS[text]
     product = _product(text)
@@ -116,7 +116,7 @@ def unit(text: str) -> tuple[float, str] | None:
     return (product[0], dimension) if product and dimension else None
 
 
-def _plain(text: str) -> str:
+def _plain_spelling(text: str) -> str:
     return " ".join(text.translate(_SPELLINGS).split())
 
 
@@ -144,7 +144,7 @@ def udunits(text: str) -> str:
     if text == "1":
         return text
     factors = []
-    for k, side in enumerate(_plain(text).split("/")):
+    for k, side in enumerate(_plain_spelling(text).split("/")):
         for part in side.split():
             match = _FACTOR.fullmatch(part)
             power = float(match[2] or 1.0) * (-1.0 if k else 1.0) if match is not None else 0.5
@@ -154,9 +154,9 @@ def udunits(text: str) -> str:
     return " ".join(factors)
 
 
-def measured(text: str) -> Exponents:
+def unit_exponents(text: str) -> Exponents:
     """Return the exponents of kg, m, s and rad of a product of known units, or of "1"; raise ValueError for others."""
-    product = (1.0, _EXPONENTS["number"]) if text == "1" else _product(_plain(text))
+    product = (1.0, _EXPONENTS["number"]) if text == "1" else _product(_plain_spelling(text))
     if product is None:
         raise ValueError(f"'{text}' is not a unit")
     return product[1]
@@ -188,7 +188,7 @@ def coefficient(value: object, dimension: str, order: int) -> float:
     if match is None or match[2] is None:
         return quantity(value, "number")
     kg, m, s, rad = _EXPONENTS[dimension]
-    product = _product(_plain(match[2]))
+    product = _product(_plain_spelling(match[2]))
     if product is None or product[1] != (kg, m, s - order, rad):
         example = f"{_example(dimension)}/s^{order}".removesuffix("^1") if order else _example(dimension)
         raise ValueError(
@@ -203,7 +203,7 @@ def quantity(value: object, dimension: str) -> float:
     Raises ValueError, in words, when the text is no quantity, the unit is unknown or belongs to another dimension, or
     the number is not finite, too large or too small.
     """
-    return _computable(_read(value, dimension), value)
+    return _computable(_read_quantity(value, dimension), value)
 
 
 def quantity_at(place: str, value: object, dimension: str) -> float:
@@ -220,7 +220,7 @@ def components(values: Iterable[object], dimension: str) -> list[float]:
     The others may be arbitrarily small: a rotation turns an entry that is zero into 1e-17, two turn it into 1e-34.
     """
     given = list(values)
-    numbers = [_read(value, dimension) for value in given]
+    numbers = [_read_quantity(value, dimension) for value in given]
     if numbers:
         largest = max(range(len(numbers)), key=lambda k: abs(numbers[k]))
         _computable(numbers[largest], given[largest])
@@ -234,7 +234,7 @@ def _computable(number: float, written: object) -> float:
     return number
 
 
-def _read(value: object, dimension: str) -> float:
+def _read_quantity(value: object, dimension: str) -> float:
     if type(value) is float and math.isfinite(value):  # nearly all values of a scene that is read again
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
@@ -249,7 +249,7 @@ def _read(value: object, dimension: str) -> float:
         number, written = float(match[1]), match[2]
         factor, factor_and_dimension = (1.0, dimension) if written is None else _known_unit(written, dimension, value)
         if factor_and_dimension != dimension:
-            rule = f"{a(dimension)} is expected, in {_known(dimension)}"
+            rule = f"{a(dimension)} is expected, in {_known_units(dimension)}"
             rule = "a number without a unit is expected" if dimension == "number" else rule
             raise ValueError(f"'{value}' is {a(factor_and_dimension)}, but {rule}")
         result = number * factor
@@ -277,7 +277,7 @@ def any_quantity(value: object) -> float | str:
     written = match[2] if match is not None else None
     if written is None or written == "%":
         return quantity(value, "number")
-    known, product = unit(written), _product(_plain(written))
+    known, product = unit(written), _product(_plain_spelling(written))
     if known is not None:
         return f"{quantity(value, known[1])!r} {_example(known[1], factor=1.0)}"
     if match is None or product is None:
@@ -300,7 +300,7 @@ def _known_unit(written: str, dimension: str, value: str) -> tuple[float, str]:
     if known is None:
         if _FRACTION.fullmatch(value.strip()):
             raise ValueError(unknown(written, value))
-        raise ValueError(f"unknown unit '{written}'; {a(dimension)} is written in {_known(dimension)}")
+        raise ValueError(f"unknown unit '{written}'; {a(dimension)} is written in {_known_units(dimension)}")
     return known
 
 
@@ -309,7 +309,7 @@ def a(dimension: str) -> str:
     return f"{'an' if dimension[0] in 'aeiou' else 'a'} {dimension}"
 
 
-def _known(dimension: str) -> str:
+def _known_units(dimension: str) -> str:
     return ", ".join(unit for unit, (_, of_unit) in UNITS.items() if of_unit == dimension) or "SI"
 
 

@@ -78,7 +78,7 @@ def _nearest(candidates: list[tuple[str, InputError]]) -> list[InputError]:
 def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputError:
     kind, context, value = error["type"], error.get("ctx", {}), error.get("input")
     keys, known, types = _place(model, error["loc"])
-    message, remedy = EXPECTED.get(kind) or _reworded(error), None
+    message, remedy = EXPECTED.get(kind) or _reword(error), None
     if kind == "extra_forbidden":
         candidates = [key for key in known if key != keys[-1]]
         if len(keys) == 1 and isinstance(value, dict):
@@ -87,9 +87,9 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
     elif not keys and kind == "value_error" and (named := _NAMED.match(message)):
         keys, message = [named[1]], message[named.end() :]
     elif kind == "union_tag_not_found":
-        keys, remedy = [*keys, _choosing(context)], f"one of: {', '.join(types)}"
+        keys, remedy = [*keys, _selecting_key(context)], f"one of: {', '.join(types)}"
     elif kind == "union_tag_invalid":
-        keys, value = [*keys, _choosing(context)], context["tag"]
+        keys, value = [*keys, _selecting_key(context)], context["tag"]
         message, remedy = f"there is no such {keys[-1]}", suggestion(str(value), types)
     if kind == "missing" and keys and isinstance(keys[-1], int):
         keys, message = keys[:-1], f"has {_entries(keys[-1])}, and needs at least {keys[-1] + 1}"
@@ -103,13 +103,13 @@ def _entries(number: int) -> str:
     return "1 entry" if number == 1 else f"{number or 'no'} entries"
 
 
-def _choosing(context: dict[str, Any]) -> str:
+def _selecting_key(context: dict[str, Any]) -> str:
     """Return the key by which pydantic selects the model; "type" where several keys select it."""
     key = str(context.get("discriminator", "")).strip("'")
     return key if key in CHOOSING else "type"
 
 
-def _reworded(error: Any) -> str:
+def _reword(error: Any) -> str:
     context = error.get("ctx", {})
     if error["type"] in ("too_long", "too_short"):
         bound, rule = ("max_length", "at most") if error["type"] == "too_long" else ("min_length", "at least")

@@ -78,7 +78,7 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
             if getattr(body, key) is not None:
                 listed.append(Effect(f"body.{name}.{key}", key, whole.name))
     for name, joint in scene.contacts().items():
-        removable = name in loose(scene)
+        removable = name in replaceable_contacts(scene)
         if removable:
             listed.append(Effect(f"joint.{name}.clearance", CLEARANCE))
         if joint.friction is not None:
@@ -99,7 +99,7 @@ def effects_of(scene: Scene, places: Collection[str], where: str) -> tuple[Effec
     usual = effects(scene)
     if not places:
         return usual
-    known = {effect.name: effect for effect in (*_on_request(scene), *usual)}
+    known = {effect.name: effect for effect in (*_effects_on_request(scene), *usual)}
     names = {name: {name, ".".join(name.split(".")[:2])} for name in known}
     every, asked = set().union(*names.values()), set(places)
     for place in sorted(asked - every):
@@ -109,10 +109,10 @@ def effects_of(scene: Scene, places: Collection[str], where: str) -> tuple[Effec
     return tuple(replace(known[name], within="".join(within[name])) for name in chosen)
 
 
-def _on_request(scene: Scene) -> Iterator[Effect]:
+def _effects_on_request(scene: Scene) -> Iterator[Effect]:
     """Yield parts whose effect is examined on request only: contacts without ideal counterpart, loads, gears."""
     for name in scene.contacts():
-        if name not in loose(scene):
+        if name not in replaceable_contacts(scene):
             yield Effect(f"joint.{name}", "contact")
     for name, load in scene.forces().items():
         joint = _joint_for(load) if isinstance(load, Bushing) else ""
@@ -132,7 +132,7 @@ def _joint_for(bushing: Bushing) -> str:
     return "cylindrical" if not z else "revolute" if any(turning) else "spherical"
 
 
-def named(scene: Scene, names: Iterable[str], where: str) -> tuple[Effect, ...]:
+def effects_by_name(scene: Scene, names: Iterable[str], where: str) -> tuple[Effect, ...]:
     """Return the effects with these names; raise InputError, with the nearest name, for an unknown one."""
     known = {effect.name: effect for effect in effects(scene)}
     for name in names:
@@ -174,7 +174,7 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
     return result
 
 
-def staying(types: Mapping[str, str]) -> list[str]:
+def contacts_that_stay(types: Mapping[str, str]) -> list[str]:
     """Return the names of contacts that an ideal mechanism keeps, as no ideal joint has their place.
 
     types: type of each joint, by name.
@@ -182,7 +182,7 @@ def staying(types: Mapping[str, str]) -> list[str]:
     return [name for name, kind in types.items() if kind in SURFACES and SURFACES[kind].ideal is None]
 
 
-def loose(scene: Scene) -> dict[str, Clearance]:
+def replaceable_contacts(scene: Scene) -> dict[str, Clearance]:
     """Return joints with clearance that have an ideal counterpart, by name: all but balls on planes."""
     return {name: joint for name, joint in scene.contacts().items() if joint.ideal is not None}
 
@@ -294,7 +294,7 @@ def uncoupled(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
     return () if names & referenced else tuple(uncoupled_parts)
 
 
-def pruned(scene: Scene, removed: Collection[str]) -> Scene:
+def without_parts(scene: Scene, removed: Collection[str]) -> Scene:
     """Return the scene without these parts; the scene itself where none are given."""
     if not removed:
         return scene

@@ -39,7 +39,7 @@ def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], p
     numbers of `recipes` the bundles ``varied/<step>/<path>`` at -2, -1, 1 and 2 steps.
     """
     from flexclear.dynamics.sensitivity.dataset import sensitivities as derivatives
-    from flexclear.dynamics.sensitivity.recipes import varied
+    from flexclear.dynamics.sensitivity.recipes import vary_number
 
     scene = rebuild(params, inputs)
     analyses.require_without_events(scene, "derivatives")
@@ -47,7 +47,7 @@ def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], p
     reduced, numbers = bundles(inputs), {}
     for path, (body, *number) in params.get("recipes", {}).items():
         around = {k: inputs[f"varied/{k}/{path}"] for k in (-2, -1, 1, 2)}
-        numbers[path] = varied(path, body, (number[0], number[1]), reduced[body], around)
+        numbers[path] = vary_number(path, body, (number[0], number[1]), reduced[body], around)
     with in_time(scene):
         names = params["of"], params["to"]
         return {"nc": derivatives(scene, reduced, progress, *names, horizon, numbers)}

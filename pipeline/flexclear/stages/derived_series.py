@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.scene.provenance import assumed
+from flexclear.scene.provenance import assumed_values
 from flexclear.stages import meshing
 from flexclear.workflow.task import given_arrays
 
@@ -33,7 +33,7 @@ def params(scene: Scene) -> dict[str, Any]:
 def origins(scene: Scene) -> dict[str, str]:
     """Return the provenance of the scene's values as attributes of datasets."""
     texts = sources(scene)
-    origin = {"sources": texts, "assumptions": assumed(texts)}
+    origin = {"sources": texts, "assumptions": assumed_values(texts)}
     return {name: json.dumps(by_place, sort_keys=True) for name, by_place in origin.items()}
 
 

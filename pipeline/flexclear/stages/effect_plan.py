@@ -109,7 +109,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
     types = {name: joint["type"] for name, joint in params["simulate"]["scene"]["joint"].items()}
-    dataset.attrs["staying"] = stay(variants.staying(types))
+    dataset.attrs["staying"] = stay(variants.contacts_that_stay(types))
     progress(None, "chart")
     requested = dict(zip(dataset["quantity"].values.tolist(), dataset["requested"].values.tolist(), strict=True))
     result: dict[str, Any] = {"nc": dataset} | files("plan", shown.table(dataset))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.post.plotting.table import files
 from flexclear.scene.quantity import Quantity
-from flexclear.scene.variants import Effect, staying
+from flexclear.scene.variants import Effect, contacts_that_stay
 from flexclear.workflow.task import Task
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def _task(
 
 
 def _staying(scene: Scene, effects: Collection[str]) -> list[str]:
-    names = staying({name: joint.type for name, joint in scene.joint.items()})
+    names = contacts_that_stay({name: joint.type for name, joint in scene.joint.items()})
     return [name for name in names if f"joint.{name}" not in effects]
 
 

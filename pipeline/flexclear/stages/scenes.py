@@ -22,10 +22,10 @@ from flexclear.artifacts.store import PARTIAL, Store
 from flexclear.post.pages import media
 from flexclear.post.plotting.table import as_html, from_markdown
 from flexclear.scene import lines
-from flexclear.scene.load import is_file, load_scene, overridden, scene_name
+from flexclear.scene.load import is_file, load_scene, scene_name, table_with_changes
 from flexclear.scene.plausibility import implausible
 from flexclear.scene.quantity import KINDS, parse
-from flexclear.scene.references import dangling
+from flexclear.scene.references import dangling_names
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
 from flexclear.scene.segments import body_frames
@@ -267,7 +267,7 @@ def _check_rest(path: Path, settings: Sequence[str], errors: str) -> None:
     wrong = set(re.findall(r"\[(\w+)\.([\w-]+)", errors))
     if not wrong or any(family not in ACTING for family, _ in wrong):
         return
-    table = overridden(path, overrides(settings))
+    table = table_with_changes(path, overrides(settings))
     for family in ACTING:
         table[family] = {name: part for name, part in table.get(family, {}).items() if (family, name) not in wrong}
     left = {key: value for key, value in table.items() if key not in ("view", "accuracy", "event")}
@@ -300,7 +300,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
             by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
         except InputError as error:
             wrong += errors_of(error)
-    refuse([lines.located(error) for error in wrong])
+    refuse([lines.with_line_number(error) for error in wrong])
     _refuse_namesakes([graph.scene for graph in by_scene.values()])
     return list(by_scene.values())
 
@@ -311,7 +311,7 @@ def in_file(path: Path | None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise lines.placed(error, path) from None
+        raise lines.with_file_name(error, path) from None
 
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
@@ -329,14 +329,14 @@ def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
     """Print plausibility warnings; raise InputErrors for dangling names. Both come before any computation."""
     require_names(scene)
     for warning in implausibilities(scene, settings):
-        print(f"flexclear: {WARNING}{lines.located(warning)}", file=sys.stderr)
+        print(f"flexclear: {WARNING}{lines.with_line_number(warning)}", file=sys.stderr)
 
 
 def require_names(scene: Scene) -> None:
     """Raise InputErrors for dangling names in a scene, before any mesh or mode is computed for it."""
     table = scene.model_dump(mode="python", exclude_none=True)
     where = str(scene.path or scene.name)
-    refuse([*dangling(table, body_frames, where), *unrecorded(scene)])
+    refuse([*dangling_names(table, body_frames, where), *unrecorded(scene)])
 
 
 def unrecorded(scene: Scene) -> Iterator[InputError]:

@@ -31,7 +31,7 @@ def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> t
         print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
     for gap in view.gaps:
         print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.words}", file=sys.stderr)
-    return files, None if refused is None else lines.placed(refused, scene.path)
+    return files, None if refused is None else lines.with_file_name(refused, scene.path)
 
 
 @dataclass(frozen=True)

@@ -26,9 +26,9 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-#: quantities that vanish at an end, as rows of `_at_end`: deflection 0, slope 1, moment 2, shear force 3
+#: quantities that vanish at an end, as rows of `_values_at_end`: deflection 0, slope 1, moment 2, shear force 3
 CONDITIONS = {"fixed": [0, 1], "pinned": [0, 2], "guided": [1, 3], "free": [2, 3]}
-#: columns of `_at_end` by parity; factors from x = l to x = -l, up to the signs of whole rows
+#: columns of `_values_at_end` by parity; factors from x = l to x = -l, up to the signs of whole rows
 EVEN, ODD, MIRRORED = slice(0, 2), slice(2, 4), np.array([1.0, 1.0, -1.0, -1.0])
 #: step of the root search in beta l; neighbouring roots are about pi/2 apart
 STEP = math.pi / 64.0
@@ -114,7 +114,7 @@ def _series(mesh: xr.Dataset, ends: Ends, family: str, count: int, *, rotary: bo
     axis, across = (2, 1) if family == "bending_y" else (1, 2)
     kappa = float(mesh["shear_coefficient"].values[0, across]) if shear else math.inf
     span = Span(length, E * float(second[axis]), rho * area, rho * float(inertia[axis]) * rotary, kappa * G * area)
-    return bending(span, of_bending, count)
+    return bending_frequencies(span, of_bending, count)
 
 
 def rod(wave_speed: float, length: float, ends: str, count: int) -> np.ndarray:
@@ -127,7 +127,7 @@ def rod(wave_speed: float, length: float, ends: str, count: int) -> np.ndarray:
     return (np.arange(1, count + 1) - shift) * wave_speed / (2.0 * length)
 
 
-def bending(span: Span, ends: str, count: int) -> np.ndarray:
+def bending_frequencies(span: Span, ends: str, count: int) -> np.ndarray:
     """Return the `count` lowest elastic bending frequencies [Hz], shape (count,).
 
     ends: conditions at both ends, two words of CONDITIONS with a hyphen, as in ``fixed-free``.
@@ -142,7 +142,7 @@ def bending(span: Span, ends: str, count: int) -> np.ndarray:
     return np.sort(np.array(roots))[:count] / (2.0 * math.pi)
 
 
-def _at_end(span: Span, omega: float) -> np.ndarray:
+def _values_at_end(span: Span, omega: float) -> np.ndarray:
     """Return deflection, slope, moment / EI and shear force / rho A omega^2 at x = l of the four shapes, (4, 4).
 
     From x = l to x = -l, deflection and moment of the even shapes (cos, cosh) keep their sign, slope and shear force
@@ -180,7 +180,7 @@ def _roots(rows: Callable[[np.ndarray], np.ndarray], span: Span, count: int) -> 
     """Return the `count` lowest omega [rad/s] at which the rows of the shapes' end values are linearly dependent."""
 
     def at(omega: float) -> float:
-        return float(np.linalg.det(rows(_at_end(span, omega))))
+        return float(np.linalg.det(rows(_values_at_end(span, omega))))
 
     roots: list[float] = []
     # rigid modes have roots at zero, below the first step

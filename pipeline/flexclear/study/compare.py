@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from flexclear.artifacts.store import publish
 from flexclear.post.pages import Part, page
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import EFFECTS, ideal, loose
+from flexclear.scene.variants import EFFECTS, ideal, replaceable_contacts
 from flexclear.stages.graph import Graph
 from flexclear.stages.scenes import joined, pictures, tables
 from flexclear.stages.workplace import Made, Workplace, check
@@ -65,7 +65,7 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
     sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
     ideals: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
-        present = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
+        present = [e for e in effects if (replaceable_contacts(scene) if e == "clearance" else scene.flexible())]
         if present or not ideals:
             made = ideal(scene, effects)
             same = any(made.model_dump() == other.model_dump() for other in ideals)

@@ -14,7 +14,7 @@ from flexclear.scene import variants
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import parse
 from flexclear.scene.units import quantity as number
-from flexclear.scene.variants import pruned
+from flexclear.scene.variants import without_parts
 from flexclear.stages import effect_plan, scenes
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
 from flexclear.study.members import Members
@@ -155,8 +155,8 @@ def bring(scene: Scene, workplace: Workplace, level: str | None = None) -> Plann
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """Apply a plan to a scene: replace and remove parts, set solver and watched quantities."""
     decided = json.loads(plan.attrs["planned"])
-    bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
-    fewer = pruned(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
+    bare = variants.without(scene, variants.effects_by_name(scene, decided["gone"], f"{scene.name} [plan]"))
+    fewer = without_parts(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
     watch = [q.name for q in scene.watched() if q.is_there(owners)]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from flexclear.artifacts.disk import publish
 from flexclear.post.pages import Part, downloads, figures_of, in_folder, page, prose
 from flexclear.scene.output import rows
-from flexclear.scene.provenance import assumed
-from flexclear.scene.variants import loose
+from flexclear.scene.provenance import assumed_values
+from flexclear.scene.variants import replaceable_contacts
 from flexclear.stages import derived_series
 from flexclear.stages.scenes import in_file, pictures
 from flexclear.stages.workplace import (
@@ -83,7 +83,7 @@ def of_scene(
     """
     scene = graph.scene
     compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)
-    if loose(scene) or scene.flexible():
+    if replaceable_contacts(scene) or scene.flexible():
         with in_file(scene.path):
             compared = compare.bring([scene], workplace, "both")
     drawn = [task for what, task in graph.render.items() if what in SHOWN_MOTION]
@@ -155,7 +155,7 @@ def _page(
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
     warnings = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
-    assumptions = by_weight(assumed(derived_series.sources(scene)), run)
+    assumptions = by_weight(assumed_values(derived_series.sources(scene)), run)
     members = _members(graph, made)
     parts: list[Any] = [
         Part("film", "The mechanism in motion", _moving(graph, made)),

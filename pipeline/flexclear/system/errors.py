@@ -14,12 +14,12 @@ EVALUATIONS, OF_TRIAL = "([solver.evaluations])", "(a trial run's own limit, not
 INTERRUPTED = 130
 
 
-def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
+def terminal_text(text: str, longest: int = LONGEST_SHOWN) -> str:
     """Return text fit for a terminal: control characters are spelt out, the middle of a long text is left out."""
     if len(text) > longest:  # first, since the following line examines each character
-        text = _short(text, longest)
+        text = _shorten(text, longest)
     text = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
-    return _short(text, longest) if len(text.encode(errors="replace")) > longest else text
+    return _shorten(text, longest) if len(text.encode(errors="replace")) > longest else text
 
 
 def of_trial(refused: str) -> str:
@@ -27,7 +27,7 @@ def of_trial(refused: str) -> str:
     return refused.replace(EVALUATIONS, OF_TRIAL)
 
 
-def _short(text: str, longest: int) -> str:
+def _shorten(text: str, longest: int) -> str:
     whole, half = text.encode(errors="replace"), longest // 2
     ends = (part.decode(errors="ignore") for part in (whole[:half], whole[-half:]))
     return f" ... ({len(whole) - 2 * half} bytes left out) ... ".join(ends)
@@ -57,8 +57,8 @@ class InputError(FlexclearError):
     exit_code = 2
 
     def __init__(self, place: str, problem: str, remedy: str | None = None) -> None:
-        self.place, self.problem = shown(place), shown(problem)
-        self.remedy = None if remedy is None else shown(remedy)
+        self.place, self.problem = terminal_text(place), terminal_text(problem)
+        self.remedy = None if remedy is None else terminal_text(remedy)
         text = f"{self.place}: {self.problem}"
         super().__init__(text if remedy is None else f"{text}\n  hint: {self.remedy}")
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.system import machine
-from flexclear.system.errors import FlexclearError, InputError, ResourceError, shown
+from flexclear.system.errors import FlexclearError, InputError, ResourceError, terminal_text
 
 if TYPE_CHECKING:
     import meshio
@@ -72,7 +72,7 @@ def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> 
         raise ResourceError(f"{where}: '{path.name}' is damaged, or needs more memory than available") from None
     except Exception as error:
         reason = _QUOTED.sub("...", str(error)) or type(error).__name__  # the file may be private
-        raise InputError(where, f"{problem}: {shown(reason)}", remedy) from None
+        raise InputError(where, f"{problem}: {terminal_text(reason)}", remedy) from None
 
 
 def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | None = None) -> meshio.Mesh:
@@ -87,7 +87,7 @@ def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | 
         for file in opened:
             require_file(file, where)
             require_whole(file, where)
-        return _parsed(path)
+        return _read_by_meshio(path)
 
 
 def _require_mesh(path: Path, where: str, largest: int | None) -> None:
@@ -139,7 +139,7 @@ def _is_hdf5(path: Path) -> bool:
     return False
 
 
-def _parsed(path: Path) -> meshio.Mesh:
+def _read_by_meshio(path: Path) -> meshio.Mesh:
     """Read a mesh for `read_mesh`; raise any error, in words or not, for unreadable content."""
     import meshio  # slow to import, and only meshes from files need it
     import numpy as np

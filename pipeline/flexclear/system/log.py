@@ -11,7 +11,7 @@ import logging
 import sys
 from typing import TextIO
 
-from flexclear.system.errors import LONGEST_MESSAGE, shown
+from flexclear.system.errors import LONGEST_MESSAGE, terminal_text
 
 LOG = logging.getLogger("flexclear")
 #: writes lines to the stream last given to `write_to`, else to the current stderr
@@ -32,7 +32,7 @@ class _Plain(logging.Formatter):
     """Formats texts that may come from other programs' files: no control characters, long texts shortened."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return shown(super().format(record), LONGEST_MESSAGE)
+        return terminal_text(super().format(record), LONGEST_MESSAGE)
 
 
 def write_to(out: TextIO | None) -> None:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from types import FrameType
 
-from flexclear.system.errors import INTERRUPTED, FlexclearError, ResourceError, shown
+from flexclear.system.errors import INTERRUPTED, FlexclearError, ResourceError, terminal_text
 from flexclear.system.platforms import plain_output, reader_has_gone
 from flexclear.workflow import workers
 
@@ -52,7 +52,7 @@ def exit_code(work: Callable[[], object], *, own: bool = True) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED_PIPE
     except (OSError, MemoryError) as error:  # errors of the machine that no other code described better
-        print(f"flexclear: {shown(str(error)) or 'there is not enough memory'}", file=sys.stderr)
+        print(f"flexclear: {terminal_text(str(error)) or 'there is not enough memory'}", file=sys.stderr)
         return ResourceError.exit_code
 
 

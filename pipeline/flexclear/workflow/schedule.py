@@ -328,7 +328,7 @@ def attempt(
 def _failure(task: Task, error: FlexclearError) -> Failure:
     """Return the failure of a task by an expected error; input errors of a scene with a file are located in it."""
     if isinstance(error, InputError) and task.context.get(PATH):
-        error = lines.located(lines.placed(error, Path(task.context[PATH])))
+        error = lines.with_line_number(lines.with_file_name(error, Path(task.context[PATH])))
         if all(str(task.context[PATH]) in one.place for one in errors_of(error)):
             return Failure(task, error.exit_code, str(error))
     return Failure(task, error.exit_code, f"{task.scene} {task.label}: {error}")

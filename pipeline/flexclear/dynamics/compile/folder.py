@@ -36,7 +36,7 @@ def writable(root: Path, report: Callable[[str], None]) -> Path:
         problem = error.strerror or str(error)
     if problem:
         report(f"compiled kernels cannot be stored in {folder} ({problem}); every process will compile its own")
-        return Path(_temporary().name)
+        return Path(_temporary_folder().name)
     refuse_shared(folder)
     return folder
 
@@ -70,7 +70,7 @@ def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
     total, removed = 0, 0
     for used, path in sorted(kernels, reverse=True):
         total += size(path)
-        if (total > largest or time.time() - used > unused) and _removed(path):
+        if (total > largest or time.time() - used > unused) and _remove_kernel(path):
             removed += 1
     return removed
 
@@ -86,7 +86,7 @@ def _used(path: Path) -> float:
     return (noted if noted.is_file() else path).stat().st_mtime
 
 
-def _removed(path: Path) -> bool:
+def _remove_kernel(path: Path) -> bool:
     """Remove a kernel, unless another process is compiling it; return True if removed."""
     with file_lock(path, wait=False) as mine:
         if mine:
@@ -96,5 +96,5 @@ def _removed(path: Path) -> bool:
 
 
 @cache
-def _temporary() -> TemporaryDirectory[str]:
+def _temporary_folder() -> TemporaryDirectory[str]:
     return TemporaryDirectory(prefix="flexclear_kernels_")

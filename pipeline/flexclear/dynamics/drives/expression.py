@@ -19,7 +19,7 @@ from flexclear.dynamics.drives.pieces import Piece, Pieces, Terms
 from flexclear.scene.expression import BENT, JUMPING, check_unit, fold
 from flexclear.scene.formulas import WHOLE, constants_of, require_used
 from flexclear.scene.laws import COEFFICIENTS, Expression
-from flexclear.scene.quantity import read
+from flexclear.scene.quantity import read_expression
 
 #: samples in which sign changes are searched for: at least, per period of the fastest sine, and at most
 FEWEST_SAMPLES, PER_PERIOD, MOST_SAMPLES = 256, 32, 2_000_000
@@ -45,7 +45,7 @@ def pieces(law: Expression, dimension: str) -> Pieces:
     known = constants_of(law.values)
     require_used(known, (law.value,))
     try:
-        steps = read(law.value, {"": {"t": False}}, known)
+        steps = read_expression(law.value, {"": {"t": False}}, known)
         check_unit(steps, dimension)
         bent = any(step in (*BENT, *JUMPING) for step in steps if isinstance(step, str))
         if bent and law.end is None:

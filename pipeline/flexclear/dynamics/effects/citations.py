@@ -9,7 +9,7 @@ from pathlib import Path
 from flexclear.artifacts.paths import PACKAGE
 from flexclear.dynamics.effects import most_parts, schemes
 from flexclear.dynamics.effects.declared import EFFECTS
-from flexclear.scene.citations import cited
+from flexclear.scene.citations import cited_sources
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.schema import Scene
 from flexclear.workflow.task import flatten
@@ -38,7 +38,7 @@ def sources(path: Path) -> Iterator[str]:
     """Yield the texts after ``Source:`` in all docstrings of a module, each on one line."""
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
-            yield from cited(ast.get_docstring(node))
+            yield from cited_sources(ast.get_docstring(node))
 
 
 def _named(scene: Scene) -> set[str]:

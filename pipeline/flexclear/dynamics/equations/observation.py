@@ -133,13 +133,13 @@ def _numbers(kind: Any) -> int:
 
 def by_name(blocks: Blocks, size: Callable[[int], int]) -> Observed:
     """Return views of the outputs that `observe` has stored."""
-    fields = {name: _named(kind, count, blocks[name]) for name, (kind, count) in _columns(size).items()}
+    fields = {name: _named_rows(kind, count, blocks[name]) for name, (kind, count) in _columns(size).items()}
     accelerations = np.concatenate([fields.pop("free_accelerations"), fields.pop("driven_accelerations")], axis=1)
     single = {name: fields[name][:, 0] for name in ("residual", "status")}
     return Observed(**fields | single, accelerations=accelerations)
 
 
-def _named(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
+def _named_rows(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
     if isinstance(kind, int):
         return block.reshape(len(block), count, kind)
     return block if kind is None else m.named(kind, block)

@@ -30,7 +30,7 @@ def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray, known: Mapp
     return y
 
 
-def closed(scene: Scene, engine: Engine) -> Scene:
+def with_closed_contacts(scene: Scene, engine: Engine) -> Scene:
     """Return the scene with initial approach speeds for the contacts that are closed in an engine's work space."""
     joints, stops = dict[str, Any](scene.joint), dict[str, Any](scene.stop)
     for c, contact in enumerate(engine.model.contacts):

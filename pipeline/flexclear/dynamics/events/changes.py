@@ -8,13 +8,13 @@ from typing import Any
 
 from flexclear.dynamics.drives.pieces import pieces_of
 from flexclear.scene.drives import JointDrive
-from flexclear.scene.events import Event, switched
+from flexclear.scene.events import Event, switched_part
 from flexclear.scene.expression import with_name
 from flexclear.scene.fields import Part
 from flexclear.scene.formulas import formula
 from flexclear.scene.laws import KINDS, Constant, Delayed, Sum
 from flexclear.scene.loads import EXPRESSIONS
-from flexclear.scene.owners import COORDINATES, locked
+from flexclear.scene.owners import COORDINATES, locked_coordinates
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
 
@@ -38,7 +38,7 @@ class Held:
         return "angle" if self.turns else "length"
 
 
-def released(scene: Scene, event: Event) -> Scene:
+def without_released_part(scene: Scene, event: Event) -> Scene:
     """Return the scene without a part; with a joint go all parts that act along its coordinates or read them."""
     family, name = event.part
     if family == "event":
@@ -66,36 +66,38 @@ def _reads(scene: Scene, load: str, joint: str) -> bool:
     return any(sort == "coordinate" and what.partition(".")[0] == joint for sort, what in reads)
 
 
-def driven(scene: Scene, name: str, event: Event) -> list[Held]:
+def coordinates_of_event(scene: Scene, name: str, event: Event) -> list[Held]:
     """Return the coordinates whose motion an event prescribes: those of a lock, or the one whose drive is switched."""
     family, part = event.part
     if event.kind == "lock" and scene.joint[part].type in COORDINATES:
-        return [_held(scene, drive, part, c) for drive, (c, _) in locked(scene, name, event).items()]
+        return [
+            _held_coordinate(scene, drive, part, c) for drive, (c, _) in locked_coordinates(scene, name, event).items()
+        ]
     if event.kind == "switch" and family == "drive" and part in scene.drive:
         drive: Any = scene.drive[part]
-        return [_held(scene, part, drive.joint, drive.coordinate)]
+        return [_held_coordinate(scene, part, drive.joint, drive.coordinate)]
     return []
 
 
-def _held(scene: Scene, drive: str, joint: str, coordinate: str | None) -> Held:
+def _held_coordinate(scene: Scene, drive: str, joint: str, coordinate: str | None) -> Held:
     known = COORDINATES[scene.joint[joint].type]
     name = coordinate or next(iter(known))
     return Held(drive, joint, name, joint if len(known) == 1 else f"{joint}.{name}", known[name])
 
 
-def freed(scene: Scene, held: Iterable[Held]) -> Scene:
+def without_drives(scene: Scene, held: Iterable[Held]) -> Scene:
     """Return the scene without the drives of some coordinates."""
     mine = {(one.joint, one.coordinate) for one in held}
 
     def on(drive: Any) -> bool:
         if not isinstance(drive, JointDrive):
             return False
-        return (drive.joint, _held(scene, "", drive.joint, drive.coordinate).coordinate) in mine
+        return (drive.joint, _held_coordinate(scene, "", drive.joint, drive.coordinate).coordinate) in mine
 
     return scene.model_copy(update={"drive": {n: d for n, d in scene.drive.items() if not on(d)}})
 
 
-def prescribed(scene: Scene, event: Event, held: Iterable[Held], at: Mapping[str, float], t: float) -> Scene:
+def with_drives_of_event(scene: Scene, event: Event, held: Iterable[Held], at: Mapping[str, float], t: float) -> Scene:
     """Return the scene with drives whose laws begin at time t [s] at the positions `at` [m or rad], by record name."""
     made: dict[str, Any] = {}
     for one in held:
@@ -114,10 +116,10 @@ def rates(scene: Scene, held: Iterable[Held], t: float) -> dict[str, float]:
     return {one.label: pieces_of(drives[one.drive].law, one.dimension).value(t, 1) for one in held}
 
 
-def exchanged(scene: Scene, event: Event, t: float) -> Scene:
+def with_switched_load(scene: Scene, event: Event, t: float) -> Scene:
     """Return the scene with a load switched at time t [s], which is time zero for the new laws and expressions."""
     name, keys = event.part[1], event.to or {}
-    new = switched(scene.load[name], event)
+    new = switched_part(scene.load[name], event)
     changed = {key: _later(getattr(new, key), t) for key in keys}
     if isinstance(new, EXPRESSIONS) and "force" in keys:
         late = tuple(with_name(text, "t", f"(t - {t!r} s)") for text in new.texts)

@@ -22,7 +22,7 @@ from flexclear.dynamics.run.coordinates import joint_coordinates
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.observation import observe, rows_of
-from flexclear.dynamics.run.evaluation.start import NO_IMPACT, overlapping
+from flexclear.dynamics.run.evaluation.start import NO_IMPACT, overlap_depths
 
 #: singular values below this fraction of the largest are rounding
 IMPULSE_RANK = 1e-9
@@ -40,7 +40,7 @@ class Impulses(NamedTuple):
 def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
     """Return record rows for states at the start, all with the contacts with which a run from the first one begins."""
     modes, latched = np.zeros((2, len(engine.model.contacts)))
-    for c in overlapping(engine, states[0]):
+    for c in overlap_depths(engine, states[0]):
         speed = engine.model.contacts[c].joint.initial_approach_speed
         if speed is not None:
             modes[c], latched[c] = 1.0, speed or NO_IMPACT

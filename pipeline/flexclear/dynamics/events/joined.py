@@ -71,20 +71,20 @@ class Phase:
     happened: Happened | None = None
 
 
-def stored(model: Model, seen: Observed) -> dict[str, np.ndarray]:
+def stored_energies(model: Model, seen: Observed) -> dict[str, np.ndarray]:
     """Return the energies over rows [J]; the potential refers to the world's origin, not to that of the kernels."""
     series = ledger.series(model, seen)
     made = {name: series[name][1] for name in ENERGIES}
-    return {**made, "potential": made["potential"] + _raised(model)}
+    return {**made, "potential": made["potential"] + _energy_of_kernels_origin(model)}
 
 
-def _raised(model: Model) -> float:
+def _energy_of_kernels_origin(model: Model) -> float:
     """Return the potential energy at the kernels' origin relative to the world's [J]."""
     mass = sum(link.mass for link in model.links[1:])
     return -float(mass * model.gravity @ model.mechanism.origin)
 
 
-def joined(scene: Scene, phases: Sequence[Phase], notes: Sequence[str]) -> LabelledArrays:
+def join_phases(scene: Scene, phases: Sequence[Phase], notes: Sequence[str]) -> LabelledArrays:
     """Return the dataset of a run with events (schema RUN); notes: sentences for its warnings."""
     runs = [phase.run for phase in phases if phase.run is not None]
     parts = [recorded(run) for run in runs]
@@ -103,7 +103,7 @@ def joined(scene: Scene, phases: Sequence[Phase], notes: Sequence[str]) -> Label
             values = _series(name, first, parts, names)
             gaps |= {name} if values.dtype.kind == "f" and not np.isfinite(values).all() else set()
         else:
-            values = _fixed(name, along, first, parts, names)
+            values = _constant_variable(name, along, first, parts, names)
         made[name] = LabelledArray(first.dims, values)
     _continue_turns(made, [len(data["time"].values) for data in parts])
     _balance(made, phases, [len(data["time"].values) for data in parts])
@@ -168,7 +168,7 @@ def _series(
     return np.concatenate(made)
 
 
-def _fixed(
+def _constant_variable(
     name: str, dim: str, first: LabelledArray, parts: Sequence[LabelledArrays], names: Mapping[str, list[Any]]
 ) -> np.ndarray:
     """Return a variable without time: for each entry, its value in the first phase that has the entry."""
@@ -204,7 +204,7 @@ def _balance(made: dict[str, LabelledArray], phases: Sequence[Phase], rows: Sequ
             brought.append(work)
         happened, loss = next(after, (None, 0.0))
         lost, work = lost + loss, work + (happened.work if happened is not None else 0.0)
-    raised = [_raised(model) - _raised(models[0]) for model in models]
+    raised = [_energy_of_kernels_origin(model) - _energy_of_kernels_origin(models[0]) for model in models]
     added = {"potential": raised, "dissipated": taken, "drive_work": brought}
     energy = {name: made[name].values + np.repeat(added.get(name, [0.0] * len(rows)), rows) for name in BOOKED}
     balance = sum(energy[name] for name in BOOKED[:-1]) - energy["drive_work"]
@@ -222,7 +222,7 @@ def _table(phases: Sequence[Phase], parts: Sequence[LabelledArrays]) -> dict[str
         for k in range(data.sizes.get("event", 0)):
             one = {name: data[name].values[k] for name in columns}
             one["event_motion"] = turning[one["event_contact"]]
-            if not _continued(listed, one, float(data["time"].values[0])):
+            if not _continues_closing(listed, one, float(data["time"].values[0])):
                 listed.append(one)
     for happened, loss in _events(phases):
         mine = {"event_time": happened.time, "event_contact": happened.name, "event_kind": happened.kind}
@@ -233,7 +233,7 @@ def _table(phases: Sequence[Phase], parts: Sequence[LabelledArrays]) -> dict[str
     return {name: LabelledArray(("event",), np.array([one.get(name, np.nan) for one in listed])) for name in names}
 
 
-def _continued(listed: Sequence[dict[str, Any]], one: dict[str, Any], start: float) -> bool:
+def _continues_closing(listed: Sequence[dict[str, Any]], one: dict[str, Any], start: float) -> bool:
     """Return True when a closing at a phase's start continues one of the previous phase; complete the latter then."""
     same = [k for k in listed if k["event_contact"] == one["event_contact"] and k["event_kind"] == "closing"]
     if one["event_kind"] != "closing" or one["event_time"] != start or not same:

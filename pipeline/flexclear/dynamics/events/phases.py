@@ -10,10 +10,17 @@ import numpy as np
 
 from flexclear.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.dynamics.equations.observation import Observed
-from flexclear.dynamics.events.carried import carry, closed
-from flexclear.dynamics.events.changes import driven, exchanged, freed, prescribed, rates, released
+from flexclear.dynamics.events.carried import carry, with_closed_contacts
+from flexclear.dynamics.events.changes import (
+    coordinates_of_event,
+    rates,
+    with_drives_of_event,
+    with_switched_load,
+    without_drives,
+    without_released_part,
+)
 from flexclear.dynamics.events.impulse import apply_impulses, rows
-from flexclear.dynamics.events.joined import Happened, Phase, joined, stored
+from flexclear.dynamics.events.joined import Happened, Phase, join_phases, stored_energies
 from flexclear.dynamics.events.watch import Watch
 from flexclear.dynamics.record.dataset import warnings
 from flexclear.dynamics.run.coordinates import joint_coordinates
@@ -22,9 +29,9 @@ from flexclear.dynamics.run.evaluation.observation import observe
 from flexclear.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.dynamics.run.ledger import require_closed
 from flexclear.dynamics.run.progress_rate import Judge, Judges, Panel, crawls
-from flexclear.dynamics.run.run import Run, follow, maker, observed, require_shallow
+from flexclear.dynamics.run.run import Run, follow, maker, observe_run, require_shallow
 from flexclear.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never
-from flexclear.dynamics.starts.snapshot import moving
+from flexclear.dynamics.starts.snapshot import with_poses_and_velocities
 from flexclear.scene.events import Event
 from flexclear.scene.quantity import Quantity, condition
 from flexclear.scene.schema import Scene
@@ -73,7 +80,7 @@ def simulated(
         notes.append("no predictability horizon with events: repeat the run from a perturbed start to estimate one")
     for note in notes:
         progress(None, f"warning: {note}")
-    return joined(scene, phases, notes)
+    return join_phases(scene, phases, notes)
 
 
 def require_false(scene: Scene, engine: Engine, y: np.ndarray) -> None:
@@ -148,7 +155,7 @@ class _Plan:
             return phase, at_once, (scene, engine, y)
         last, trajectory, switched, event = self._followed(engine, made, y, watch, bool(conditions))
         event = first if event is None and first is not None and until < end else event
-        seen = observed(last, trajectory)
+        seen = observe_run(last, trajectory)
         require_shallow(last.model, trajectory, seen)
         run = Run(scene, last, trajectory, seen, None, switched, mended)
         exchanged = require_closed(last.model, *run.judged, max((p.exchanged for p in before), default=0.0))
@@ -162,7 +169,7 @@ class _Plan:
             phase,
             run=run,
             end=t,
-            ends=_last(stored(last.model, seen)),
+            ends=_last_values(stored_energies(last.model, seen)),
             coordinates={n: float(v[0][-1]) + shift[n] for n, v in series.items()},
             exchanged=exchanged,
         )
@@ -220,25 +227,25 @@ class _Plan:
     def changed(self, name: str, scene: Scene, engine: Engine, y: np.ndarray, phase: Phase) -> tuple[_Start, Happened]:
         """Return the start of the next phase after an event, and the record of the event."""
         event, t = self.scene.event[name], phase.end
-        still = moving(closed(scene, engine), engine, y, t)
+        still = with_poses_and_velocities(with_closed_contacts(scene, engine), engine, y, t)
         start = still.start.model_copy(update={"branch": ()}) if still.start is not None else None
         still = still.model_copy(update={"start": start, "time": self.scene.time.model_copy(update={"start": t})})
         if event.kind == "release":
-            return _Start(released(still, event), (engine, y)), Happened(name, event.kind, t)
-        held, (family, part) = driven(still, name, event), event.part
+            return _Start(without_released_part(still, event), (engine, y)), Happened(name, event.kind, t)
+        held, (family, part) = coordinates_of_event(still, name, event), event.part
         if family == "load" and part in still.load:
-            return _Start(exchanged(still, event, t), (engine, y)), Happened(name, event.kind, t)
+            return _Start(with_switched_load(still, event, t), (engine, y)), Happened(name, event.kind, t)
         if not held:
             raise InputError(
                 f"[event.{name}.{event.kind}]",
                 f"{family}.{part} is released by an earlier event",
                 "remove one of the two events",
             )
-        free = freed(still, held)
-        after = prescribed(free, event, held, phase.coordinates, t)
+        free = without_drives(still, held)
+        after = with_drives_of_event(free, event, held, phase.coordinates, t)
         other = maker(free, self.bundles, self.progress)()
         struck = apply_impulses(other, consistent_start(other), t, rates(after, held, t))
-        moved = moving(free, other, struck.y, t)
+        moved = with_poses_and_velocities(free, other, struck.y, t)
         after = after.model_copy(update={"body": moved.body, "start": moved.start})
         impulse = next(iter(struck.impulses.values())) if len(held) == 1 else np.nan
         return _Start(after, (engine, y)), Happened(name, event.kind, t, impulse, struck.work, held[0].turns)
@@ -248,8 +255,8 @@ def _energies(engine: Engine, y: np.ndarray, t: float) -> dict[str, float]:
     """Return the energies of a start state [J]."""
     engine.select_pieces_after(t)
     seen: Observed = observe(engine, rows(engine, y[None], t), after=True)
-    return _last(stored(engine.model, seen))
+    return _last_values(stored_energies(engine.model, seen))
 
 
-def _last(series: Mapping[str, np.ndarray]) -> dict[str, float]:
+def _last_values(series: Mapping[str, np.ndarray]) -> dict[str, float]:
     return {name: float(values[-1]) for name, values in series.items()}

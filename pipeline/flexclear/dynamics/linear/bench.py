@@ -14,7 +14,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.model import initial, selection
 from flexclear.dynamics.model.contacts import arms
-from flexclear.dynamics.model.driving import prescribed
+from flexclear.dynamics.model.driving import prescribed_coordinates
 from flexclear.dynamics.model.gauges import angles
 from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.model.mechanism import build
@@ -23,7 +23,7 @@ from flexclear.dynamics.run.evaluation import closure_rows, observation
 from flexclear.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.dynamics.run.evaluation.start import NO_IMPACT
 from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
-from flexclear.dynamics.run.run import begun, driven
+from flexclear.dynamics.run.run import with_driven_actuators, with_start_state
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError, SolverError
@@ -56,7 +56,9 @@ class Bench:
     @property
     def units(self) -> np.ndarray:
         """Reference size of each drive: a radian, or the mechanism's size [m]; shape (known,)."""
-        return np.array([1.0 if p.dimension == "angle" else self.model.length for p in prescribed(self.model.scene)])
+        return np.array(
+            [1.0 if p.dimension == "angle" else self.model.length for p in prescribed_coordinates(self.model.scene)]
+        )
 
     @property
     def fastest(self) -> float:
@@ -93,7 +95,7 @@ def hold(
     moving: True when the drives keep their speed at that time.
     Raises InputError for unknown drives, SolverError when the loops cannot be closed there.
     """
-    moved, given = driven(begun(scene, bundles, progress)[0], bundles, progress)
+    moved, given = with_driven_actuators(with_start_state(scene, bundles, progress)[0], bundles, progress)
     model = tabulate(build(moved, bundles), given)
     arrays = replace(model.arrays, h=model.arrays.h.copy(), f=model.arrays.f.copy())
     engine = prepare(replace(model, arrays=arrays), progress)
@@ -167,10 +169,10 @@ def move_drives(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
         return close(bench, start)
 
     # smallest step, as a fraction of the whole way, before the pose counts as out of reach
-    return in_strides(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, 1e-4)
+    return approach_in_steps(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, 1e-4)
 
 
-def in_strides(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, shortest: float) -> Pose:
+def approach_in_steps(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, shortest: float) -> Pose:
     """Return the pose at the end of a way by steps of at(fraction of the way, pose before) from the pose at its start.
 
     A step is halved where `at` raises SolverError, which is re-raised below the shortest step.
@@ -248,15 +250,15 @@ def inertia(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
     return L @ L.T, engine.rows(m.JACOBIAN) @ modes.T
 
 
-def balancing(bench: Bench) -> float:
+def balancing_moment(bench: Bench) -> float:
     """Return the size of the forces that balance each other in the state evaluated last, as moments [N m].
 
     Their sum along the free coordinates is no measure: in balance it is rounding.
     """
-    return float(np.max(np.abs(acting(bench)), initial=0.0))
+    return float(np.max(np.abs(acting_wrenches(bench)), initial=0.0))
 
 
-def acting(bench: Bench) -> np.ndarray:
+def acting_wrenches(bench: Bench) -> np.ndarray:
     """Return wrenches of inertia, gravity, loads and contacts on each link with its subtree, and those of each load and
     contact alone, in the state evaluated last, as moments [N m]."""
     moments, forces = carried_wrenches(bench.engine)

@@ -185,7 +185,7 @@ def _sense(moved: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return np.where(along > (1.0 - DECISIVE) * whole, 0.0, sense)
 
 
-def _followed(points: Sequence[Point | None]) -> list[Branch]:
+def _follow_branches(points: Sequence[Point | None]) -> list[Branch]:
     """Return the branches of all vibrations, from the last speed down: there whirls are separated most."""
     branches: list[Branch] = []
     for s, point in reversed(list(enumerate(points))):
@@ -223,7 +223,7 @@ def _misfit(branch: Branch, point: Point, k: int) -> tuple[float, float]:
 
 
 def _dataset(bench: Bench, which: int, speeds: np.ndarray, points: Sequence[Point | None]) -> xr.Dataset:
-    branches = _followed(points)
+    branches = _follow_branches(points)
     shape = len(speeds), len(branches)
     frequency, whirl, decay, over = (np.full(shape, np.nan) for _ in range(4))
     dominant, kind, critical = [], [], np.full(len(branches), np.nan)
@@ -238,7 +238,7 @@ def _dataset(bench: Bench, which: int, speeds: np.ndarray, points: Sequence[Poin
         dominant.append(max(sorted(set(names)), key=names.count))
         ahead = np.nansum(np.sign(whirl[:, b]))
         kind.append(WHIRLS[1 + int(np.sign(ahead))])
-        critical[b] = _crossing(speeds, over[:, b])
+        critical[b] = _critical_speed(speeds, over[:, b])
     frames = list(bench.model.mechanism.frames)
     nothing = np.full((len(frames), 3), np.nan)
     data = {
@@ -256,7 +256,7 @@ def _dataset(bench: Bench, which: int, speeds: np.ndarray, points: Sequence[Poin
     return conform(diagram, CAMPBELL, title=title, **attributes(bench.scene), drive=bench.model.drives[which])
 
 
-def _crossing(speeds: np.ndarray, over: np.ndarray) -> float:
+def _critical_speed(speeds: np.ndarray, over: np.ndarray) -> float:
     """Return the lowest speed at which a whirl is synchronous with the turning axes, interpolated; NaN if none."""
     known = np.isfinite(over) & (speeds != 0.0)
     x, y = speeds[known], over[known]

@@ -27,19 +27,19 @@ from scipy.linalg import block_diag
 from scipy.sparse.linalg import SuperLU, splu
 
 from flexclear.artifacts.labelled import Labelled
-from flexclear.dynamics.model.closing import displaced, misfit
-from flexclear.dynamics.model.constraints import Constraint, constraints, demands, prescribed
-from flexclear.dynamics.model.contacts import resolved
+from flexclear.dynamics.model.closing import displaced_poses, misfit
+from flexclear.dynamics.model.constraints import Constraint, constraints, coordinate_demands, demands
+from flexclear.dynamics.model.contacts import resolve_law
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.record.wrenches import (
     FrameWrench,
     Wrench,
+    connected_bodies,
     joint_wrenches,
     on_frames,
     path_wrenches,
-    reached,
 )
 from flexclear.dynamics.run.run import Run
 from flexclear.numerics.rotations import cross, rotation_vector_to_matrix, skew
@@ -96,7 +96,7 @@ def knows_all_joints(model: Model) -> bool:
 
 def _separation(joint: Clearance, force: float) -> float:
     """Return how far the points may separate [m]: the clearance, and the penetration under a force."""
-    law = resolved(joint, 1.0, "[normal]")  # the depth at rest does not depend on the mass
+    law = resolve_law(joint, 1.0, "[normal]")  # the depth at rest does not depend on the mass
     # assumed force on a joint with clearance after separation, as a multiple of the ideal force
     return joint.clearance + law.depth(10.0 * force)
 
@@ -151,7 +151,9 @@ def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
     """Return the wrenches of a joint's rows in `misfit`: constraints, then driven coordinates."""
     A, B = joint.frames(poses)
     demanded = demands(joint.edge.kind, A, B)[1]
-    return np.vstack([demanded, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else demanded
+    return (
+        np.vstack([demanded, coordinate_demands(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else demanded
+    )
 
 
 def body_motion(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:
@@ -196,7 +198,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
     forces -= np.einsum("tlk,klj->tj", A, bundle["position_mode_moment"].values)
     shapes, turns = bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values
     frames = [str(frame) for frame in bundle["frame"].values]
-    for frame, moment, force in _acting(motions, name, joints):
+    for frame, moment, force in _wrenches_at_frames(motions, name, joints):
         k = frames.index(frame.partition(".")[2])
         about = moment - cross(motions.positions([frame])[:, 0], force)
         turning, pushing = (np.einsum("tji,tj->ti", own.R, part) for part in (about, force))
@@ -204,7 +206,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
     return np.asarray(forces)
 
 
-def _acting(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
+def _wrenches_at_frames(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
     """Return the wrenches of joints, paths and loads on a body at its frames; moments about the kernels' origin."""
     model, acting = motions.model, list[FrameWrench]()
     for joint, (frame, sign) in _ports(model.scene, name).items():
@@ -226,7 +228,7 @@ def openings(
     placement = poses[i].of(model.mechanism.links[i].placements[name])
     frames = [str(frame) for frame in bundle["frame"].values]
     matrix, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, tuple[Any, Any]]()
-    for body, frame in _carried(model.scene, name).items():
+    for body, frame in _carrying_frames(model.scene, name).items():
         k = frames.index(frame)
         u = placement.R @ bundle["frame_translation_shape"].values[k]
         theta = placement.R @ bundle["frame_rotation_shape"].values[k]
@@ -260,7 +262,7 @@ def curvature(
         joints.append(replace(joint, values={k: now[joint.name, k] for k in joint.values}))
 
     def residuals(move: np.ndarray) -> np.ndarray:
-        moved = displaced(model.mechanism, poses, move[:m])
+        moved = displaced_poses(model.mechanism, poses, move[:m])
         return misfit(model.mechanism, _bent(model, joints, bundles, move[m:]), moved).values
 
     closed = misfit(model.mechanism, joints, poses).values  # to the tolerance of the run
@@ -300,7 +302,7 @@ def _bent(
         own, first = q[first : first + bundle.sizes["mode"]], first + bundle.sizes["mode"]
         place = model.mechanism.links[model.mechanism.link_of[name]].placements[name]
         frames = [str(frame) for frame in bundle["frame"].values]
-        for body, frame in _carried(model.scene, name).items():
+        for body, frame in _carrying_frames(model.scene, name).items():
             k = frames.index(frame)
             at = place.of(Placement(bundle["frame_position"].values[k])).p
             R = rotation_vector_to_matrix(place.R @ bundle["frame_rotation_shape"].values[k] @ own)
@@ -324,7 +326,7 @@ def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:
     return ports
 
 
-def _carried(scene: Scene, name: str) -> dict[str, str]:
+def _carrying_frames(scene: Scene, name: str) -> dict[str, str]:
     """Return the frame that carries each body fixed to a body, and the body itself by each frame with another joint."""
     fixed = [part.between for part in scene.joint.values() if part.type == "fixed"]
     pairs = [(a.partition(".")[0], b.partition(".")[0]) for a, b in fixed]
@@ -332,6 +334,6 @@ def _carried(scene: Scene, name: str) -> dict[str, str]:
     for ends, pair in zip(fixed, pairs, strict=True):
         for near, far in ((0, 1), (1, 0)):
             if pair[near] == name:
-                carriers |= dict.fromkeys(reached(pair[far], beyond), ends[near].partition(".")[2])
+                carriers |= dict.fromkeys(connected_bodies(pair[far], beyond), ends[near].partition(".")[2])
     own = [frame for joint, (frame, _) in _ports(scene, name).items() if scene.joint[joint].type != "fixed"]
     return carriers | {f"{name}.{frame}": frame for frame in own}

@@ -27,11 +27,11 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics.linear.bench import (
     Bench,
+    approach_in_steps,
     balance,
-    balancing,
+    balancing_moment,
     close,
     hold,
-    in_strides,
     moved_on,
     set_drives,
 )
@@ -108,7 +108,7 @@ def _descended(bench: Bench, at: Tangent) -> Equilibrium:
         if float(np.max(np.abs(at.Z @ step) / bench.model.speed_scales)) <= SHORT_MOVE:
             return Equilibrium(at, residual(bench, at), iteration)
         at = _search(bench, at, step)
-    loose = _leading(bench.model, at.Z @ at.unbalanced, at.mass)
+    loose = _dominant_part(bench.model, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
         f"the search for a static equilibrium close to this pose failed in {MOST_MOVES} iterations: "
         f"a force of {residual(bench, at):.3g} N stays unbalanced, most of it at {loose}; "
@@ -162,7 +162,7 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
     raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium is possible from this pose")
 
 
-def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
+def _dominant_part(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
     """Name the joint, body without joint, or deformation with most of the kinetic energy of a motion.
 
     motion: speeds, shape (nv,).
@@ -178,7 +178,7 @@ def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
     return max(fractions, key=lambda name: fractions[name])
 
 
-def balanced(
+def bench_in_equilibrium(
     scene: Scene,
     bundles: Mapping[str, Labelled],
     progress: Progress,
@@ -204,7 +204,7 @@ def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
     reached, failure = list[tuple[Equilibrium, Vibrations]](), None
     # angles with their full turns, which the search tracks, belong to the pose
     internal, kept = bench.internal.copy(), list[np.ndarray]()
-    for find in (_continued, descend) if np.any(bench.drives[:, 1]) else (descend,):
+    for find in (_steady_motion, descend) if np.any(bench.drives[:, 1]) else (descend,):
         bench.internal[:] = internal
         try:
             rest = find(bench, q)
@@ -232,7 +232,7 @@ def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
     return reached[best]
 
 
-def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
+def _steady_motion(bench: Bench, q: np.ndarray) -> Equilibrium:
     """Return the steady motion by Newton's method, at once or with the drives' speed increased from rest."""
     internal = bench.internal.copy()
     try:
@@ -251,7 +251,7 @@ def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
 
     try:
         set_drives(bench, bench.drives * [1.0, 0.0])
-        return in_strides(at, descend(bench, q), 1.0, SHORTEST)
+        return approach_in_steps(at, descend(bench, q), 1.0, SHORTEST)
     finally:
         set_drives(bench, bench.drives)
 
@@ -299,19 +299,19 @@ def _is_steady(bench: Bench, at: Tangent) -> bool:
     if fastest == 0.0:
         return True
     model, before = bench.model, balance(bench, at.q)
-    forces = balancing(bench)
+    forces = balancing_moment(bench)
     units = row_units(model, bench.engine.h, model.length)
     loops = float(np.max(np.abs(before.slip) / units, initial=0.0))
     if loops > STEADY * fastest:
         return False
     with moved_on(bench, PROBE / fastest) as later:
         after = balance(later, at.q)
-        forces = max(forces, balancing(later))
+        forces = max(forces, balancing_moment(later))
     change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
-    return change <= STEADY * forces + _rounding(bench, at)
+    return change <= STEADY * forces + _rounding_moment(bench, at)
 
 
-def _rounding(bench: Bench, at: Tangent) -> float:
+def _rounding_moment(bench: Bench, at: Tangent) -> float:
     """Return the effect of position rounding on stiff balancing forces along the free motions, as moments [N m]."""
     K, _ = stiffness(bench, at, at.Z)
     forces = at.mass @ at.Z @ K @ at.Z.T @ at.mass

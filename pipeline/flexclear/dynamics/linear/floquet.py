@@ -28,14 +28,14 @@ from flexclear.dynamics.linear.vibrations import (
     ZERO_EIGENVALUE,
     Equations,
     Vibrations,
-    ascending,
     eigenpairs,
     equations,
+    frequency_order,
     principal_motions,
-    solved,
+    time_invariant_motions,
     vibrations,
 )
-from flexclear.dynamics.model.driving import prescribed
+from flexclear.dynamics.model.driving import prescribed_coordinates
 from flexclear.system.errors import SolverError
 
 #: motion of the drives that tests whether the forces stay constant, in radians or fractions of the mechanism's size
@@ -78,7 +78,7 @@ def small_motions(bench: Bench, at: Tangent) -> Vibrations:
     first = Instant(here, np.eye(len(here.K)))
     if _differ(first, _after(bench, at, here, PROBE / bench.fastest), here.scale):
         return _floquet(bench, at, first)
-    return solved(here)
+    return time_invariant_motions(here)
 
 
 def _after(bench: Bench, at: Tangent, here: Equations, duration: float) -> Instant:
@@ -121,7 +121,7 @@ def _negligible(A: np.ndarray, wrong: np.ndarray) -> np.ndarray:
 
 def _period(bench: Bench, at: Tangent, first: Instant) -> float:
     """Return the time in which the slowest drive turns once [s]."""
-    turns = [p.dimension == "angle" for p in prescribed(bench.model.scene)]
+    turns = [p.dimension == "angle" for p in prescribed_coordinates(bench.model.scene)]
     speeds = np.abs(bench.drives[turns, 1])
     period = float(2.0 * np.pi / np.min(speeds[speeds > 0.0], initial=np.inf))
     if not period or _differ(first, _after(bench, at, first.of, period), first.of.scale):
@@ -188,7 +188,7 @@ def _floquet(bench: Bench, at: Tangent, first: Instant) -> Vibrations:
     whole = np.zeros((n, len(value)), dtype=complex)
     whole[~moving, :still] = np.eye(still)
     whole[moving, still:] = shape[:, once] / scale[:, None]
-    order = ascending(value)
+    order = frequency_order(value)
     whole = whole[:, order] / np.linalg.norm(whole[:, order], axis=0)
     return Vibrations(value[order], here.motions @ whole, still, error[order], fixed=True)
 

@@ -91,11 +91,11 @@ def response(
     # number of poses at which the vibrations are computed
     for row in np.unique(np.linspace(0, len(once) - 1, 8).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
-        assembled = _assembled(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
+        assembled = _elastic_mechanism(model, clearance_response.opening_map(model, joints, poses), poses, bundles)
         if assembled is None:
             return unknown
         multipliers = clearance_response.multipliers(motions, assembled.lever, loads, row)
-        responses.append(_at(assembled, bundles, forces, time, chosen, multipliers))
+        responses.append(_response_in_pose(assembled, bundles, forces, time, chosen, multipliers))
     worst = {q.name: max(r.influence[q.name] for r in responses) for q in chosen}
     responding = [r for r in responses if np.isfinite(r.excited)]
     excited = min((r.excited for r in responding), default=np.nan)
@@ -136,7 +136,7 @@ class _Assembled:
         return np.hstack([rigid, self.own[body][0 if turning else 1]])
 
 
-def _assembled(
+def _elastic_mechanism(
     model: Model, lever: clearance_response.OpeningMap, poses: Sequence[Placement], bundles: Mapping[str, Labelled]
 ) -> _Assembled | None:
     """Return the elastic mechanism in a pose; None without any vibration."""
@@ -206,7 +206,7 @@ def _momenta(bundle: Labelled, placement: Placement, centre: np.ndarray) -> tupl
     return push, about_frame + np.cross(placement.p - centre, push, axisa=0, axisb=0).T
 
 
-def _at(
+def _response_in_pose(
     assembled: _Assembled,
     bundles: Mapping[str, Labelled],
     forces: np.ndarray,

@@ -37,11 +37,15 @@ def _energies(motions: Motions) -> dict[str, np.ndarray]:
     motions: first row: the drives' motion alone, which is subtracted; then those with the speeds of vibrations.
     What loads stiffen is of second order here and neglected.
     """
-    energies = {name: _rigid(body, motions.body(name)) for name, body in motions.model.scene.rigid().items()}
+    energies = {
+        name: _energy_of_rigid_body(body, motions.body(name)) for name, body in motions.model.scene.rigid().items()
+    }
     for i in motions.model.numbering.flexible:
         link, state = motions.model.links[i], motions.modal(i)
         assert link.bundle is not None
-        energies[str(link.flexible)] = _flexible(link.bundle, motions.link(i), state.q[0], state.u[1:] - state.u[0])
+        energies[str(link.flexible)] = _energy_of_flexible_body(
+            link.bundle, motions.link(i), state.q[0], state.u[1:] - state.u[0]
+        )
     return energies
 
 
@@ -51,12 +55,12 @@ def _relative(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     return parts[0] @ motion.R[0], parts[1] @ motion.R[0]
 
 
-def _rigid(body: RigidBody, motion: Motion) -> np.ndarray:
+def _energy_of_rigid_body(body: RigidBody, motion: Motion) -> np.ndarray:
     v, omega = _relative(motion)
     return body.mass * np.sum(v * v, axis=1) + np.einsum("ti,ij,tj->t", omega, np.array(body.inertia), omega)
 
 
-def _flexible(bundle: Labelled, frame: Motion, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _energy_of_flexible_body(bundle: Labelled, frame: Motion, q: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return twice the kinetic energy of a modally reduced body whose frame moves; see `bodies.flexible`."""
     v, omega = _relative(frame)
     E, C = (bundle[n].values for n in ("position_mode_moment", "modal_first_moment"))

@@ -24,9 +24,9 @@ from flexclear.dynamics.compile import sources
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.linear.bench import (
     Bench,
-    acting,
+    acting_wrenches,
     balance,
-    balancing,
+    balancing_moment,
     displacement_map,
     set_drives,
     state,
@@ -50,7 +50,7 @@ class Tangent:
 
     q: positions.  Z: speeds per free motion, shape (nv, mobility).  moves: positions per coordinate, (nq, nv).
     bias, mass, multipliers: as in `bench.Balance`; multipliers balance `bias` best.
-    forces: size of the balancing forces (`bench.balancing`).
+    forces: size of the balancing forces (`bench.balancing_moment`).
     """
 
     q: np.ndarray
@@ -74,7 +74,7 @@ class Tangent:
 
 def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     """Return the free motions at closed positions q; raise SolverError at deformations beyond any real pose."""
-    b, forces = balance(bench, q), balancing(bench)
+    b, forces = balance(bench, q), balancing_moment(bench)
     try:
         Z, lower, spread = free_motions(b.mass, b.jacobian)
     except np.linalg.LinAlgError:
@@ -109,7 +109,7 @@ def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarra
     directions = np.zeros((motions.shape[1], bench.model.ny))
     directions[:, : len(at.q)] = (at.moves @ motions).T
     changes = force_changes(bench, at.q, directions, at.multipliers)
-    return motions.T @ changes.T, _rounding(bench, motions, changes, at.forces)
+    return motions.T @ changes.T, _rounding_of_changes(bench, motions, changes, at.forces)
 
 
 def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -117,25 +117,25 @@ def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray,
     directions = np.zeros((motions.shape[1], bench.model.ny))
     directions[:, bench.model.speeds] = motions.T
     changes = force_changes(bench, at.q, directions, np.zeros_like(at.multipliers))
-    return motions.T @ changes.T, _rounding(bench, motions, changes, _by_turning(bench, at))
+    return motions.T @ changes.T, _rounding_of_changes(bench, motions, changes, _forces_by_turning(bench, at))
 
 
-def _by_turning(bench: Bench, at: Tangent) -> float:
+def _forces_by_turning(bench: Bench, at: Tangent) -> float:
     """Return the contribution of the drives' motion to the balancing forces, per speed of the fastest; 0 at rest."""
     if not bench.fastest:
         return 0.0
-    moving, drives = acting(bench), bench.drives
+    moving, drives = acting_wrenches(bench), bench.drives
     try:
         set_drives(bench, drives * [1.0, 0.0])
         balance(bench, at.q)
-        resting = acting(bench)
+        resting = acting_wrenches(bench)
     finally:
         set_drives(bench, drives)
     balance(bench, at.q)  # later code reads the moving state
     return float(np.max(np.abs(moving - resting), initial=0.0)) / bench.fastest
 
 
-def _rounding(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: float) -> np.ndarray:
+def _rounding_of_changes(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: float) -> np.ndarray:
     """Return the rounding error of changes of forces along motions, by the size of all summands, shape (n,).
 
     forces: balancing forces, as moments, per displacement or speed: their sum may itself be rounding.
@@ -154,7 +154,7 @@ def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multiplie
     engine, model, count = bench.engine, bench.model, len(directions)
     w = changed(bench, q, directions)
     o = engine.h[m.JACOBIAN]
-    rows = selection.dense(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
+    rows = selection.dense_rows(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
     forces = dual.changes(bias(engine, w), count)
     return (forces - multipliers @ rows) @ modes_of(model.arrays).T
 

@@ -87,7 +87,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
     """Compute all small motions about a pose in balance, with equations that do not vary with time."""
     if not at.Z.shape[1]:
         return Vibrations(np.zeros(0, dtype=complex), np.zeros((len(at.bias), 0), dtype=complex), 0, np.zeros(0))
-    return solved(equations(bench, at, principal_motions(bench, at)))
+    return time_invariant_motions(equations(bench, at, principal_motions(bench, at)))
 
 
 def principal_motions(bench: Bench, at: Tangent) -> np.ndarray:
@@ -107,19 +107,19 @@ def equations(bench: Bench, at: Tangent, motions: np.ndarray) -> Equations:
     return Equations(motions, K, D, free, error, rate_error)
 
 
-def solved(of: Equations) -> Vibrations:
+def time_invariant_motions(of: Equations) -> Vibrations:
     """Return the small motions of equations that do not vary with time."""
     if is_symmetric(of.K, of.error) and not np.any(of.D):
         k, axes = _principal(_symmetric(of.K, of.error), of.free)
         # a falling motion, of negative stiffness, grows as exp(+sqrt(-k) t)
         value, shape, value_error = np.sqrt((-k).astype(complex)), axes.astype(complex), np.zeros(len(k))
     else:
-        value, shape, value_error = _damped(of)
-    order = ascending(value)
+        value, shape, value_error = _damped_eigenpairs(of)
+    order = frequency_order(value)
     return Vibrations(value[order], of.motions @ shape[:, order], int(of.free.sum()), value_error[order])
 
 
-def ascending(value: np.ndarray) -> np.ndarray:
+def frequency_order(value: np.ndarray) -> np.ndarray:
     """Return the order of eigenvalues by frequency, then by size."""
     return np.lexsort((np.abs(value), np.abs(value.imag)))
 
@@ -188,7 +188,7 @@ def _principal(K: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return k, full
 
 
-def _damped(of: Equations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _damped_eigenpairs(of: Equations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return eigenvalues lambda and vectors, one of each conjugate pair, and errors of lambda."""
     loose = of.free & ~np.any(of.D, axis=0) & ~np.any(of.D, axis=1)
     kept = np.tile(~loose, 2)

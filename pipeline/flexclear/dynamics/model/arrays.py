@@ -83,7 +83,7 @@ def rows(table: Any, entries: Any) -> np.ndarray:
     return np.asarray(entries, dtype=number).reshape(-1, table.size)
 
 
-def named(table: Any, entries: Any) -> np.ndarray:
+def named_rows(table: Any, entries: Any) -> np.ndarray:
     """Return rows of a table with named fields, shape (rows,), from the same arguments as `rows`."""
     return m.named(table, rows(table, entries).ravel())
 
@@ -109,7 +109,7 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
 
 def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int]:
     """Return the sizes of the header that follow from the tables."""
-    closures = named(m.CLOSURES, tables[m.CLOSURES])
+    closures = named_rows(m.CLOSURES, tables[m.CLOSURES])
     counted = {name: table for name, table in m.NAMED.items() if table in count and f"n_{name}" in m.SIZES}
     return {m.SIZES[f"n_{name}"]: count[table] for name, table in counted.items()} | {
         m.N_FLEX: count[m.FLEXES],
@@ -118,8 +118,8 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
         m.NY: count[m.GROUPS],
         m.N_GROUPS: count[m.FLOORS],
         m.N_COMPONENTS: count[m.BOOKS],
-        m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
-        m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
+        m.MASS_SIZE: envelope_size(named_rows(m.ENVELOPE, tables[m.ENVELOPE])),
+        m.SCHUR_SIZE: envelope_size(named_rows(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
         m.JACOBIAN_SIZE: int(np.sum(3 * closures["threes"] * closures["n_support"])),
     }
 

@@ -23,7 +23,7 @@ from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.system.errors import InputError
 
 
-def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, *, exact: bool = False) -> Mechanism:
+def assemble(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, *, exact: bool = False) -> Mechanism:
     """Return the mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
 
     Mechanisms with flexible bodies or paths are only checked: the engine closes them, with deformation and prescribed
@@ -52,16 +52,18 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, *, ex
         candidates = assemblies(mechanism, joints, placed, starts)
         if not candidates and not exact:
             mine = (mechanism, joints, placed, starts)
-            fits = _fitted(mechanism, joints, given, lambda within: [one.poses for one in assemblies(*mine, within)])
+            fits = _assemble_with_moved_frames(
+                mechanism, joints, given, lambda within: [one.poses for one in assemblies(*mine, within)]
+            )
             if fits is not None:
                 return fits
-        return _searched(mechanism, joints, placed, starts, candidates)
+        return _place_links(mechanism, joints, placed, starts, candidates)
     asked = bool(starts or mechanism.deformation)
     if mechanism.has_paths or not (mechanism.all_rigid or asked):
         return with_starts(mechanism, poses)
     closed = close(mechanism, joints, poses)
     if closed is None and mechanism.all_rigid:
-        fits = None if exact else _fitted(mechanism, joints, given, lambda within: [poses])
+        fits = None if exact else _assemble_with_moved_frames(mechanism, joints, given, lambda within: [poses])
         if fits is not None:
             return fits
         _refuse_drives(mechanism, joints, poses)
@@ -69,7 +71,7 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, *, ex
     return with_starts(mechanism, closed or poses)
 
 
-def _fitted(
+def _assemble_with_moved_frames(
     mechanism: Mechanism,
     joints: list[Constraint],
     given: Mapping[str, Pieces],
@@ -77,19 +79,19 @@ def _fitted(
 ) -> Mechanism | None:
     """Return the assembled mechanism with frames moved within their tolerances; None where these do not suffice.
 
-    near: as in `fitting.fitted`.
+    near: as in `fitting.fit_frames`.
     """
     scene = mechanism.scene
     # plans make bodies with recipes rigid, whose frames are then as exact as the mesh has them
     tolerant = scene.recipes() or any(body.frame_tolerance for body in scene.rigid().values())
-    other = fitting.fitted(mechanism, joints, near) if tolerant else None
+    other = fitting.fit_frames(mechanism, joints, near) if tolerant else None
     if other is None:
         return None
-    fits = assembled(other, given, exact=True)
-    return replace(fits, choice=" ".join([fitting.changed(mechanism, other), fits.choice]).strip())
+    fits = assemble(other, given, exact=True)
+    return replace(fits, choice=" ".join([fitting.describe_moved_frames(mechanism, other), fits.choice]).strip())
 
 
-def _searched(
+def _place_links(
     mechanism: Mechanism,
     joints: list[Constraint],
     placed: set[int],
@@ -112,12 +114,12 @@ def with_starts(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
     links, settled_poses = [], list(poses)
     for i, link in enumerate(mechanism.links):
         if link.massless and i:
-            settled_poses[i] = _between(mechanism, link, poses, settled_poses)
+            settled_poses[i] = _massless_link_pose(mechanism, link, poses, settled_poses)
         links.append(replace(link, start=settled_poses[i]))
     return replace(mechanism, links=links)
 
 
-def _between(
+def _massless_link_pose(
     mechanism: Mechanism, link: Link, poses: Sequence[Placement], settled_poses: Sequence[Placement]
 ) -> Placement:
     """Return the pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""

@@ -62,11 +62,11 @@ def _joint(edge: Edge, reverse: bool) -> list[InboardJoint]:
     one_axis = len({c.axis for c in declared.COORDINATES}) <= 1
     if count <= 1 or (not driven and (one_axis or not reverse)):
         return [InboardJoint(edge.kind, positions=tuple(range(count)), drives=driven, sign=sign)]
-    parts = _single(declared.COORDINATES, edge.drives or (None,) * count, 0, sign)
+    parts = _single_joints(declared.COORDINATES, edge.drives or (None,) * count, 0, sign)
     return parts[::-1] if reverse else parts
 
 
-def _single(
+def _single_joints(
     coordinates: tuple[Coordinate, ...], drives: tuple[str | None, ...], first: int, sign: float
 ) -> list[InboardJoint]:
     """Return a hinge or slide per coordinate; first: position in the joint of the first one."""
@@ -79,12 +79,12 @@ def _single(
 def _path(edge: Edge) -> list[InboardJoint]:
     """Return slides to the frame's origin; then Cardan angles, a rotation vector, or a free rotation."""
     turns = edge.drives[3:]
-    slides = _single(SLIDES, edge.drives[:3], 0, 1.0)
+    slides = _single_joints(SLIDES, edge.drives[:3], 0, 1.0)
     if edge.vector:
         return [*slides, InboardJoint("rotation-vector", positions=(3, 4, 5), drives=tuple(d for d in turns if d))]
     if not any(turns):
         return [*slides, InboardJoint("spherical", positions=(3, 4, 5, 6))]
-    return [*slides, *_single(TURNS, turns, 3, 1.0)]
+    return [*slides, *_single_joints(TURNS, turns, 3, 1.0)]
 
 
 def path_positions(edge: Edge, R: np.ndarray, p: np.ndarray) -> np.ndarray:

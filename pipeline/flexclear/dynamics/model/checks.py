@@ -24,10 +24,10 @@ Check = Callable[[], object]
 def part_errors(scene: Scene) -> list[InputError]:
     """Return the errors of drives, loads, stops, gears and start values that the scene's other numbers do not matter
     for: missing coordinates, wrong units, laws that jump or do not cover the run."""
-    return errors_from(_of_parts(scene))
+    return errors_from(_checks_of_parts(scene))
 
 
-def _of_parts(scene: Scene) -> Iterator[Check]:
+def _checks_of_parts(scene: Scene) -> Iterator[Check]:
     for name, drive in scene.drive.items():
         yield partial(drive_laws, scene.model_copy(update={"drive": {name: drive}}), NO_LAWS)
         for actuator in (isinstance(drive, PathDrive) and drive.actuators) or ():

@@ -70,7 +70,7 @@ def close(
     Levenberg-Marquardt with the damping |r|, which converges quadratically also where joints impose a condition twice
     (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
     """
-    here, grain = list(poses), _rounding(mechanism)
+    here, grain = list(poses), _rounding_of_positions(mechanism)
     exact, closed = max(CLOSED_EXACTLY, 4.0 * grain), max(CLOSED_ENOUGH, 100.0 * grain)
     now = misfit(mechanism, joints, here)
     if now.worst <= exact:
@@ -87,7 +87,7 @@ def close(
         # least damping, as a fraction of the mean of the normal matrix, which is singular for redundant joints
         scale = max(damping * float(np.linalg.norm(now.values)), 1e-15) * normal.trace() / rows
         step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
-        there = displaced(mechanism, here, step)
+        there = displaced_poses(mechanism, here, step)
         then = misfit(mechanism, joints, there)
         if np.linalg.norm(then.values) < np.linalg.norm(now.values):
             here, now, damping = there, then, 0.1 * damping
@@ -98,7 +98,7 @@ def close(
     return here if now.worst <= max(closed, within) else None
 
 
-def _rounding(mechanism: Mechanism) -> float:
+def _rounding_of_positions(mechanism: Mechanism) -> float:
     """Return the rounding of the largest coordinates of the scene, as a fraction of the mechanism's size."""
     reach = [mechanism.origin, *(link.start.p for link in mechanism.links)]
     reach += [frame.placement.p for frame in mechanism.frames.values()]
@@ -145,7 +145,7 @@ def _mobilities(mechanism: Mechanism, poses: Sequence[Placement], still: Collect
     return np.array(result)
 
 
-def displaced(mechanism: Mechanism, poses: Sequence[Placement], step: np.ndarray) -> list[Placement]:
+def displaced_poses(mechanism: Mechanism, poses: Sequence[Placement], step: np.ndarray) -> list[Placement]:
     """Return the poses after motions of the links, shape (6 (links - 1),), as in `misfit`."""
     moved = [poses[0]]
     for i, link in enumerate(mechanism.links[1:], start=1):

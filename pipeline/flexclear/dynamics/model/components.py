@@ -32,7 +32,7 @@ class Components:
         return max([0, *(self.of_link[link] for link in links)])
 
 
-def joined(scene: Scene) -> list[tuple[str, ...]]:
+def coupled_frames(scene: Scene) -> list[tuple[str, ...]]:
     """Return the frames between which each part of a scene acts: joints, loads, gears and paths."""
 
     def of_joints(*names: str) -> tuple[str, ...]:
@@ -60,7 +60,7 @@ def components(scene: Scene, parents: Sequence[int], link_of: Mapping[str, int])
             link = root[link]
         return link
 
-    parts = joined(scene)
+    parts = coupled_frames(scene)
     held = [[link_of[b] for f in part if (b := f.partition(".")[0]) in link_of] for part in parts]
     for links in [*held, *([i, parent] for i, parent in enumerate(parents))]:
         moving = [find(link) for link in links if link > 0]

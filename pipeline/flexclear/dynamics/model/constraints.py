@@ -59,7 +59,7 @@ class Constraint:
 
     def prescribed(self, poses: Sequence[Placement]) -> Demands:
         """Return residuals and wrenches of the coordinates that have prescribed `values`."""
-        return prescribed(self.edge.kind, *self.frames(poses), self.values)
+        return coordinate_demands(self.edge.kind, *self.frames(poses), self.values)
 
     def frames(self, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
         """Return both frames in the world, from the poses of all links."""
@@ -115,7 +115,7 @@ def demands(kind: str, A: Placement, B: Placement) -> Demands:
     return Demands(np.array(residuals), np.array(wrenches).reshape(-1, 6))
 
 
-def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> Demands:
+def coordinate_demands(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> Demands:
     """Return residuals and wrenches of those coordinates of a joint that have prescribed values."""
     declared, relative = joint_type(kind), A.inverse().of(B)
     now = declared.coordinates(relative.R, relative.p)

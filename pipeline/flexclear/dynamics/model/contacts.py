@@ -114,10 +114,10 @@ def resolve_one(mechanism: Mechanism, contact: Contact) -> Resolved:
             f'bare numbers are in metres; write "{radius:g} mm" for millimetres',
         )
     mass = _reduced_mass([mechanism.links[site.link].mass for site in ends])
-    return resolved(contact.joint, mass, f"[{contact.place}.normal]")
+    return resolve_law(contact.joint, mass, f"[{contact.place}.normal]")
 
 
-def resolved(joint: Clearance | End, mass: float | None, path: str) -> Resolved:
+def resolve_law(joint: Clearance | End, mass: float | None, path: str) -> Resolved:
     """Return the normal law of a contact; raise InputError, placed at `path`, for a law with impossible values.
 
     mass: that rebounds [kg], for laws whose damping depends on it.

@@ -37,12 +37,14 @@ def label(joint: str, kind: str, k: int) -> str:
     return joint if len(declared) == 1 else f"{joint}.{declared[k].name}"
 
 
-def prescribed(scene: Scene) -> list[Prescribed]:
+def prescribed_coordinates(scene: Scene) -> list[Prescribed]:
     """Return all prescribed coordinates, in the order of the scene; raise InputError for those that do not exist."""
-    return [one for drive in together(partial(_prescribed, scene, name) for name in scene.drive) for one in drive]
+    return [
+        one for drive in together(partial(_coordinates_of_drive, scene, name) for name in scene.drive) for one in drive
+    ]
 
 
-def _prescribed(scene: Scene, name: str) -> list[Prescribed]:
+def _coordinates_of_drive(scene: Scene, name: str) -> list[Prescribed]:
     drive = scene.drive[name]
     if not isinstance(drive, PathDrive):
         coordinate = coordinate_of(scene, drive.joint, drive.coordinate, f"[drive.{name}]")[2]

@@ -16,7 +16,7 @@ from flexclear.numerics.rotations import matrix_to_quaternion, rotation_vector_t
 from flexclear.scene.parts import FRAME_ERROR, RigidBody
 
 
-def fitted(
+def fit_frames(
     mechanism: Mechanism, joints: list[Constraint], near: Callable[[float], Iterable[Sequence[Placement]]]
 ) -> Mechanism | None:
     """Return the mechanism with frames of bodies moved by the least amount that lets nearly fitting joints fit.
@@ -28,7 +28,7 @@ def fitted(
     if not tolerances:
         return None
     within = max(tolerances.values()) / mechanism.length
-    fits = (_fitted(mechanism, joints, poses, tolerances, within) for poses in near(within))
+    fits = (_fit_frames_within(mechanism, joints, poses, tolerances, within) for poses in near(within))
     return next((one for one in fits if one is not None), None)
 
 
@@ -41,7 +41,7 @@ def _tolerances(mechanism: Mechanism) -> dict[str, float]:
     return {name: tolerance for name, tolerance in known.items() if tolerance > 0.0}
 
 
-def _fitted(
+def _fit_frames_within(
     mechanism: Mechanism,
     joints: list[Constraint],
     poses: Sequence[Placement],
@@ -62,7 +62,7 @@ def _fitted(
             body, _, frame = name.partition(".")
             if body not in tolerances:
                 continue
-            place = best[link].of(mechanism.links[link].placements[body]).inverse().of(_met(joint, best, far))
+            place = best[link].of(mechanism.links[link].placements[body]).inverse().of(_fitting_frame(joint, best, far))
             if np.linalg.norm(place.p - mechanism.frames[name].placement.p) > tolerances[body]:
                 return None
             moved.setdefault(body, {})[frame] = place
@@ -75,7 +75,7 @@ def _rebuilt(mechanism: Mechanism, moved: Mapping[str, Mapping[str, Placement]])
     bodies, bundles = dict(mechanism.scene.body), dict[str, Labelled]()
     for link in mechanism.links:
         if link.flexible and link.bundle is not None:
-            bundles[link.flexible] = _placed(link.bundle, moved.get(link.flexible, {}))
+            bundles[link.flexible] = _with_frames_at(link.bundle, moved.get(link.flexible, {}))
     for body, places in moved.items():
         old = bodies[body]
         if isinstance(old, RigidBody):
@@ -89,7 +89,7 @@ def _rebuilt(mechanism: Mechanism, moved: Mapping[str, Mapping[str, Placement]])
     return build(mechanism.scene.model_copy(update={"body": bodies}), bundles)
 
 
-def _placed(bundle: Labelled, places: Mapping[str, Placement]) -> Labelled:
+def _with_frames_at(bundle: Labelled, places: Mapping[str, Placement]) -> Labelled:
     """Return a bundle with frames at these places in the undeformed body."""
     arrays = of(bundle)
     position, rotation = (arrays[name].values.copy() for name in ("frame_position", "frame_rotation"))
@@ -101,7 +101,7 @@ def _placed(bundle: Labelled, places: Mapping[str, Placement]) -> Labelled:
     return replace(arrays, variables={**arrays.variables, **changes})
 
 
-def _met(joint: Constraint, poses: Sequence[Placement], far: bool) -> Placement:
+def _fitting_frame(joint: Constraint, poses: Sequence[Placement], far: bool) -> Placement:
     """Return a joint's second (`far`) or first frame in the world, moved by the least that makes the joint fit."""
     A, B = joint.frames(poses)
     # steps of Newton's method for the frame of a joint; they converge quadratically from the errors of a mesh
@@ -115,7 +115,7 @@ def _met(joint: Constraint, poses: Sequence[Placement], far: bool) -> Placement:
     return B if far else A
 
 
-def changed(before: Mechanism, after: Mechanism) -> str:
+def describe_moved_frames(before: Mechanism, after: Mechanism) -> str:
     """Return a sentence that lists bodies whose frames were moved, with amounts."""
     away = dict[str, float]()
     for name, frame in after.frames.items():

@@ -54,12 +54,12 @@ class Contradiction:
         """Return a sentence with both values and their difference."""
         unit = "rad" if self.turning else "m"
         return (
-            f"{self.what} starts at {_written(self.now)} {unit} in the given poses, but at "
-            f"{_written(self.value)} {unit} by {self.rule}: they differ by {self.size:.3g} {unit}"
+            f"{self.what} starts at {_coordinate_text(self.now)} {unit} in the given poses, but at "
+            f"{_coordinate_text(self.value)} {unit} by {self.rule}: they differ by {self.size:.3g} {unit}"
         )
 
 
-def _written(value: float) -> str:
+def _coordinate_text(value: float) -> str:
     """Return a coordinate [m or rad] as text; values below 1e-12 are rounding and become 0."""
     return f"{0.0 if abs(value) < 1e-12 else value:.6g}"
 
@@ -73,14 +73,16 @@ def contradictions(
     """
     placed = given_links(mechanism)
     driven = [joint for joint in joints if joint.values and {joint.link_a, joint.link_b} <= placed]
-    collected = [contradiction for joint in driven for contradiction in _of_joint(joint, poses)]
+    collected = [contradiction for joint in driven for contradiction in _contradictions_of_joint(joint, poses)]
     for link in mechanism.links:
         edge = link.branch.edge
         if edge is None or edge.kind != PATH or link.massless:
             continue
         site = mechanism.site(edge.frame_b)
         if site.link in placed:
-            collected += _of_path(mechanism, edge, poses[site.link].of(start_place(mechanism, site)), given)
+            collected += _contradictions_of_path(
+                mechanism, edge, poses[site.link].of(start_place(mechanism, site)), given
+            )
     return [contradiction for contradiction in collected if contradiction.drive not in given]
 
 
@@ -94,7 +96,7 @@ def given_links(mechanism: Mechanism) -> set[int]:
     }
 
 
-def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Contradiction]:
+def _contradictions_of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Contradiction]:
     now, kind = joint.coordinates(poses), joint.edge.kind
     differences = joint.prescribed(poses).residuals
     for (k, value), difference in zip(joint.values.items(), differences, strict=True):
@@ -108,7 +110,9 @@ def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Contrad
         yield Contradiction(drive, path, rule, what, start, value, coordinate.turning)
 
 
-def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str, Pieces]) -> Iterator[Contradiction]:
+def _contradictions_of_path(
+    mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str, Pieces]
+) -> Iterator[Contradiction]:
     t = mechanism.scene.time.start
     laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
     now = path_positions(edge, G.R, G.p + mechanism.origin)

@@ -16,7 +16,7 @@ Guard = tuple[tuple[int, ...], float, float]
 
 def fill(mechanism: Mechanism, of_effects: list[Guard], loaded: Loaded) -> dict[Any, Any]:
     """Return the tables GUARDS and GUARD_NUMBERS."""
-    guards = [*_of_contacts(mechanism), *of_effects, *_of_loads(loaded)]
+    guards = [*_guards_of_contacts(mechanism), *of_effects, *_guards_of_loads(loaded)]
     return {
         m.GUARDS: [row for row, _, _ in guards],
         m.GUARD_NUMBERS: [(level, scale) for _, level, scale in guards],
@@ -30,14 +30,14 @@ def speeds(table: Any, offset: int, count: int, levels: tuple[float, ...], conta
             yield (table.at, offset, count, contact, -1), level, level
 
 
-def _of_contacts(mechanism: Mechanism) -> Iterator[Guard]:
+def _guards_of_contacts(mechanism: Mechanism) -> Iterator[Guard]:
     for c, (_, joint, *_) in enumerate(mechanism.contacts):
         if joint.friction is not None:
             law = friction_law(joint)
             yield from speeds(m.TOUCH, c * m.TOUCH.size + m.TOUCH.slip, 1, law.kinks(joint.friction), c)
 
 
-def _of_loads(loaded: Loaded) -> Iterator[Guard]:
+def _guards_of_loads(loaded: Loaded) -> Iterator[Guard]:
     for k, levels in enumerate(loaded.bends):
         for level in levels:
             yield (m.LOAD_BENDS.at, k * m.LOAD_BENDS.size, 1, -1, -1), level, level

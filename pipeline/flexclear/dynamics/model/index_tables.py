@@ -111,7 +111,7 @@ def closures(
         m.ENTRIES: entries,
         m.KNOWN_ENTRIES: known,
         m.PATHS: paths,
-        **_couplings(arrays.named(m.CLOSURES, closure), supports),
+        **_couplings(arrays.named_rows(m.CLOSURES, closure), supports),
     }
     return tables, tuple(closing[k] for k in order)
 
@@ -198,7 +198,7 @@ def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]
     return {
         m.CLOSURE_PAIRS: pairs,
         m.COMMON: common,
-        m.CLOSURE_ENVELOPE: closure_envelope(closure, arrays.named(m.CLOSURE_PAIRS, pairs)),
+        m.CLOSURE_ENVELOPE: closure_envelope(closure, arrays.named_rows(m.CLOSURE_PAIRS, pairs)),
     }
 
 

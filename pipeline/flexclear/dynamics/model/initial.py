@@ -90,10 +90,10 @@ class Rate:
 
 def given_rates(model: Model) -> list[Rate]:
     """Return all velocities of joints and modes that the scene gives, except those of driven coordinates."""
-    return [*_of_joints(model), *_of_modes(model)]
+    return [*_rates_of_joints(model), *_rates_of_modes(model)]
 
 
-def _of_joints(model: Model) -> Iterator[Rate]:
+def _rates_of_joints(model: Model) -> Iterator[Rate]:
     closures = model.arrays.table(m.CLOSURES)
     for start in given_coordinates(model.scene):
         if start.velocity is None:
@@ -111,7 +111,7 @@ def _of_joints(model: Model) -> Iterator[Rate]:
                 yield Rate(path, start.velocity, size, sites=sites, coordinate=start.coordinate)
 
 
-def _of_modes(model: Model) -> Iterator[Rate]:
+def _rates_of_modes(model: Model) -> Iterator[Rate]:
     bundles = {link.flexible: link.bundle for link in model.links if link.flexible and link.bundle is not None}
     for name, values in given_modes(model.scene, bundles, "velocity").items():
         for c, value in zip(model.numbering.modal_coordinates[model.mechanism.link_of[name]], values, strict=True):
@@ -140,7 +140,7 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
     requested, others = with_velocities(model), given_rates(model)
     y = y.copy()
     y[model.speeds] = 0.0
-    given, centres = _given(requested).ravel(), [centre_of(model, name) for name in requested]
+    given, centres = _given_velocities(requested).ravel(), [centre_of(model, name) for name in requested]
     known = ~np.isnan(given)
 
     unit, L = model.speed_scales, model.length
@@ -186,9 +186,9 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
         return y
     elastic[[rate.speed for rate in others if rate.speed is not None]] = False
     equations = velocity_equations(model, motion, y)
-    speeds, miss = _least(equations.matrix * ~elastic, equations.target)
+    speeds, miss = _least_speeds(equations.matrix * ~elastic, equations.target)
     if miss > RIGID * equations.fastest:
-        speeds, miss = _least(equations.matrix, equations.target)
+        speeds, miss = _least_speeds(equations.matrix, equations.target)
     largest = float(np.max(np.abs(equations.asked), initial=0.0))
     if equations.given and miss > max(INPUT_DIGITS * equations.fastest, fraction * largest):
         names = ", ".join(path.removeprefix("[body.").removesuffix(".velocity]") for path in equations.given)
@@ -201,10 +201,10 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
         )
     if with_velocities(model):
         rigid = np.flatnonzero(~elastic)
-        left = _open(equations.matrix[:, rigid])
+        left = _undetermined_speeds(equations.matrix[:, rigid])
         drives, roots = _energy_roots(model, motion, y, rigid)
         moving = drives + roots @ speeds[rigid]
-        change = _least(roots @ left, moving)[0]
+        change = _least_speeds(roots @ left, moving)[0]
         if np.linalg.norm(roots @ left @ change) > RIGID * np.linalg.norm(moving):
             speeds[rigid] -= left @ change
     y = y.copy()
@@ -212,7 +212,7 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
     return y
 
 
-def _open(matrix: np.ndarray) -> np.ndarray:
+def _undetermined_speeds(matrix: np.ndarray) -> np.ndarray:
     """Return the speeds that equations with this matrix leave open, as orthonormal columns."""
     _, values, ways = np.linalg.svd(matrix)
     return np.asarray(ways[int(np.sum(values > REDUNDANT * values.max(initial=0.0))) :].T)
@@ -258,7 +258,7 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
     y: state at the start.  frames, sites: of all links and sites there, named fields of LINK_FRAMES and SITE_FRAMES.
     """
     requested, changes, unit = with_velocities(model), [], _units(model)
-    given = _given(requested)
+    given = _given_velocities(requested)
     limit = INPUT_DIGITS * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
     for name, row in zip(requested, given, strict=True):
         change = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
@@ -300,7 +300,7 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
     return changes
 
 
-def _given(requested: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
+def _given_velocities(requested: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
     """Return angular velocity and velocity given for each body, shape (bodies, 6); nan where none is given."""
     given = [_components(b.angular_velocity) + _components(b.velocity) for b in requested.values()]
     return np.array(given).reshape(-1, 6)
@@ -316,7 +316,7 @@ def _slow(model: Model) -> float:
     return 1.0 / (model.scene.time.end - model.scene.time.start)
 
 
-def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
+def _least_speeds(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the least speeds that come nearest to the target, and their largest error; all in natural units."""
     speeds, *_ = np.linalg.lstsq(matrix, target, rcond=REDUNDANT)
     return speeds, float(np.max(np.abs(matrix @ speeds - target), initial=0.0))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model.components import joined
+from flexclear.dynamics.model.components import coupled_frames
 from flexclear.dynamics.model.mechanism import Mechanism
 from flexclear.numerics.rotations import first_largest
 
@@ -50,7 +50,7 @@ def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
     n = bundle.sizes["mode"]
     if mass_coupled(bundle) or any(body.stiffening is not None for body in mechanism.scene.flexible().values()):
         return InterfaceBasis(np.eye(n), 0)
-    used = {frame for part in joined(mechanism.scene) for frame in part if frame.partition(".")[0] == name}
+    used = {frame for part in coupled_frames(mechanism.scene) for frame in part if frame.partition(".")[0] == name}
     return basis(_motions(bundle, sorted(used)), np.diag(bundle["modal_stiffness"].values))
 
 

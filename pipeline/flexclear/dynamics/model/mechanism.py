@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from flexclear.dynamics.model.chain import InboardJoint, chain, path_pose
-from flexclear.dynamics.model.components import Components, components, joined
-from flexclear.dynamics.model.driving import joint_type, prescribed
+from flexclear.dynamics.model.components import Components, components, coupled_frames
+from flexclear.dynamics.model.driving import joint_type, prescribed_coordinates
 from flexclear.dynamics.model.laws import checked_law
 from flexclear.dynamics.model.merge import (
     Frame,
@@ -184,7 +184,7 @@ class Mechanism:
     @cached_property
     def drives(self) -> tuple[str, ...]:
         """Names of the prescribed coordinates, in the order of the scene."""
-        return tuple(one.name for one in prescribed(self.scene))
+        return tuple(one.name for one in prescribed_coordinates(self.scene))
 
     @cached_property
     def drive_signs(self) -> np.ndarray:
@@ -230,7 +230,7 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
     require_bodies(scene)
     frames = frames_of(scene, bundles)
     groups, group_of = merge(scene, frames)
-    starts = start_places(scene, groups, group_of, frames, _led(scene))
+    starts = start_places(scene, groups, group_of, frames, _poses_on_paths(scene))
     masses = [0.0, *(_mass(scene, group, bundles) for group in groups[1:])]
     branches, closing = span(masses, edges(scene, frames, group_of))
     origin = _centre(starts)
@@ -242,9 +242,9 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
         placed = replace(branch, parent=carried[branch.parent] if branch.parent >= 0 else -1)
         body = _Body(scene, group, start, bundles[group.host] if group.flexible else None)
         if branch.edge is None:
-            links.append(_unjoined(body, placed))
+            links.append(_free_link(body, placed))
         else:
-            links += _joined(body, placed, frames, links, link_of, origin)
+            links += _links_of_group(body, placed, frames, links, link_of, origin)
         carried.append(len(links) - 1)
         link_of.update(dict.fromkeys(group.placements, len(links) - 1))
 
@@ -268,13 +268,13 @@ def _mass(scene: Scene, group: Group, bundles: Mapping[str, Labelled]) -> float:
     return float(bundles[group.host]["mass"].values) if group.flexible else rigid_inertia(scene, group.placements).mass
 
 
-def _led(scene: Scene) -> dict[str, Placement]:
+def _poses_on_paths(scene: Scene) -> dict[str, Placement]:
     """Return the poses at the start of frames on a path, of bodies without a given pose."""
     places = {}
     for name, drive in scene.drive.items():
         body = scene.body.get(drive.frame.partition(".")[0]) if isinstance(drive, PathDrive) else None
         if isinstance(drive, PathDrive) and getattr(body, "pose", drive) is None:
-            mine = [one for one in prescribed(scene) if one.name.startswith(f"{name}.")]
+            mine = [one for one in prescribed_coordinates(scene) if one.name.startswith(f"{name}.")]
             laws = {one.name: checked_law(scene, one.law, one.dimension, one.place) for one in mine}
             values = {one.removeprefix(f"{name}."): law.value(scene.time.start) for one, law in laws.items()}
             places[drive.frame] = path_pose(values, drive.angles == "rotation-vector")
@@ -307,7 +307,7 @@ class _Body:
         return Link(branch, self.group, places, self.start.of(own), joint, inboard, inertia)
 
 
-def _unjoined(body: _Body, branch: Branch) -> Link:
+def _free_link(body: _Body, branch: Branch) -> Link:
     """Return the ground, or a body without joint, with its frame at the centre of mass to decouple its motions."""
     if branch.parent < 0:
         places = {n: body.start.of(p) for n, p in body.group.placements.items()}
@@ -317,7 +317,7 @@ def _unjoined(body: _Body, branch: Branch) -> Link:
     return body.link(branch, own, Site(0, Placement(), None), InboardJoint("free"))
 
 
-def _joined(
+def _links_of_group(
     body: _Body,
     branch: Branch,
     frames: Mapping[str, Frame],
@@ -401,7 +401,7 @@ def require_bodies(scene: Scene) -> None:
     moving = [*scene.rigid(), *scene.flexible()]
     if not moving:
         raise InputError("[body]", "the scene has no body that could move", "add a rigid or flexible body")
-    held = {frame.partition(".")[0] for part in joined(scene) for frame in part}
+    held = {frame.partition(".")[0] for part in coupled_frames(scene) for frame in part}
     for name in moving:
         if scene.joint and name not in held:
             raise InputError(

@@ -98,7 +98,7 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
         if joint.type != "fixed":
             continue
         a, b = (find_frame(frames, f, f"[joint.{name}.between]") for f in joint.between)
-        if _flexible(scene, a.body) or _flexible(scene, b.body):
+        if _is_flexible(scene, a.body) or _is_flexible(scene, b.body):
             continue
         b_in_a = a.placement.of(b.placement.inverse())
         neighbours[a.body].append((b.body, b_in_a))
@@ -113,7 +113,7 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
             places = groups[0].placements  # several bodies of type ground are one world
         else:
             places = {}
-            groups.append(Group(root, places, _flexible(scene, root)))
+            groups.append(Group(root, places, _is_flexible(scene, root)))
         _flood(root, neighbours, places)
         group_of.update(dict.fromkeys(places, 0 if is_ground else len(groups) - 1))
     if not grounds:
@@ -155,7 +155,7 @@ def _flood(root: str, neighbours: Mapping[str, list[tuple[str, Placement]]], pla
                 stack.append(other)
 
 
-def _flexible(scene: Scene, body: str) -> bool:
+def _is_flexible(scene: Scene, body: str) -> bool:
     return isinstance(scene.body[body], FlexibleBody)
 
 

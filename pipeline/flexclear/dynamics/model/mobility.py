@@ -110,7 +110,7 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
         direction = random.normal(size=here.free.shape[1])
         motion = here.free @ (direction / np.linalg.norm(direction))
         motion *= NEARBY[k % 2] / max(1.0, float(np.linalg.norm(motion)))
-        closed = close(model.mechanism, joints, _displaced(model, start, motion))
+        closed = close(model.mechanism, joints, _poses_after_motion(model, start, motion))
         if closed is None:
             continue
         there = [link.start for link in with_starts(model.mechanism, closed).links]
@@ -140,7 +140,7 @@ def _singular_start(model: Model, here: Rates) -> str:
     )
 
 
-def _displaced(model: Model, poses: Sequence[Placement], motion: np.ndarray) -> list[Placement]:
+def _poses_after_motion(model: Model, poses: Sequence[Placement], motion: np.ndarray) -> list[Placement]:
     """Return the poses after a small motion of the tree's free coordinates."""
     numbering, twists, moved = model.numbering, motions(model, poses).twists, [poses[0]]
     for i in range(1, len(poses)):

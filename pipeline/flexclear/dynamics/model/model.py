@@ -15,7 +15,7 @@ from flexclear.dynamics.model import contacts as contacting
 from flexclear.dynamics.model import filling, flexible_bodies, guards, index_tables, laws, of_effects
 from flexclear.dynamics.model import loads as loading
 from flexclear.dynamics.model.arrays import Arrays, pack
-from flexclear.dynamics.model.assembly import assembled
+from flexclear.dynamics.model.assembly import assemble
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.gauges import Gauges
 from flexclear.dynamics.model.gears import Coupling, couplings
@@ -85,11 +85,11 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NO_LAWS) -
     given: laws that replace the scene's: of prescribed coordinates by name, and of loads along joints as ``load.NAME``.
     Raises InputError for a mechanism that cannot be built.
     """
-    mechanism = assembled(mechanism, given)
-    return filled(mechanism, number(mechanism), given)
+    mechanism = assemble(mechanism, given)
+    return fill_model(mechanism, number(mechanism), given)
 
 
-def filled(
+def fill_model(
     mechanism: Mechanism,
     numbering: Numbering,
     given: Mapping[str, Pieces] = laws.NO_LAWS,
@@ -116,10 +116,10 @@ def filled(
         **contacting.fill(numbering, parts, normals, site_pairs, gauges, slots["bristles"]),
         **laws.fill([*in_tree, *loaded.laws]),
         **loaded.tables,
-        m.LOADS: _booked(mechanism, loaded, books),
+        m.LOADS: _load_rows(mechanism, loaded, books),
         **of_effects.tables(filling.Filling(numbering, parts, ordered, gauges, slots)),
         **guards.fill(mechanism, of_effects.guards(mechanism, parts), loaded),
-        **_recorded(mechanism),
+        **_record_tables(mechanism),
         m.GAUGES: gauges.rows,
         m.GRAVITY: gravity,
         m.BOOKS: books,
@@ -130,7 +130,7 @@ def filled(
     }
     tables[m.GROUPS], tables[m.FLOORS] = _error_groups(numbering, parts, gauges)
     if like is None:
-        tables |= _wired(numbering, parts, books) | looped
+        tables |= _topology_tables(numbering, parts, books) | looped
     else:
         wired = {table for array in ("h", "f") for table in m.TABLES[array]} - tables.keys()
         tables |= {table: like.arrays.rows(table) for table in wired}
@@ -151,7 +151,7 @@ def filled(
     return Model(*made, loaded.loads, *of_mechanism, numbering.nq, numbering.nv, ny)
 
 
-def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
+def _record_tables(mechanism: Mechanism) -> dict[Any, Any]:
     """Return the tables of what is recorded by name: moving bodies in the order of the scene, and frames."""
     bodies, frames, links = mechanism.moving_bodies, mechanism.frames.values(), mechanism.links
     holding = [mechanism.link_of[frame.body] for frame in frames]
@@ -186,7 +186,7 @@ def _symmetric(J: np.ndarray) -> list[float]:
 DEEP_TREE = 8.0
 
 
-def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
+def _topology_tables(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
     """Return the tables that follow from links, joints, frames and flexible bodies; those of closures excluded."""
     return {
         m.LINKS: _links(numbering, parts),
@@ -206,11 +206,11 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool)
         forms=tuple(sorted({law.form for law in normals})),
         closures=bool(mechanism.closures or mechanism.scene.gear),
         harmonics=harmonics,
-        articulated=articulated(numbering),
+        articulated=is_deep_tree(numbering),
     )
 
 
-def articulated(numbering: Numbering) -> bool:
+def is_deep_tree(numbering: Numbering) -> bool:
     """Return True when the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP_TREE`)."""
     if not numbering.nv:
         return False
@@ -282,7 +282,7 @@ def _books(slots: Mapping[str, int]) -> Books:
     return [Book(m.DRIVE_WORK, m.MODAL_LOSS, slots["loads"]), *(Book(k, k + 1, k + 2) for k in others)]
 
 
-def _booked(mechanism: Mechanism, loaded: loading.Loaded, books: Books) -> list[tuple[int, ...]]:
+def _load_rows(mechanism: Mechanism, loaded: loading.Loaded, books: Books) -> list[tuple[int, ...]]:
     """Return the rows of the table LOADS, with the ledger index of each load's energy sums."""
     links = [[mechanism.link_of[frame.partition(".")[0]] for frame in load.frames] for load in loaded.loads]
     parts = [mechanism.components.of(*both) for both in links]

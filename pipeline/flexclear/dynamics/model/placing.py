@@ -123,13 +123,13 @@ def _anywhere(
     for joint in joints:
         numbers = range(len(joint_type(joint.edge.kind).COORDINATES))
         chosen = [k for k in numbers if {joint.link_a, joint.link_b} <= placed or (joint.name, k) in known]
-        held.append(_held(joint, at, [k for k in chosen if k not in joint.values]))
+        held.append(_with_prescribed_coordinates(joint, at, [k for k in chosen if k not in joint.values]))
     freedoms = _freedoms(mechanism, held, at.poses)
     for i, joint in enumerate(joints):
         for k, coordinate in enumerate(joint_type(joint.edge.kind).COORDINATES):
             if not freedoms or k in held[i].values or (joint.name, k) in said:
                 continue
-            more = [*held[:i], _held(held[i], at, [k]), *held[i + 1 :]]
+            more = [*held[:i], _with_prescribed_coordinates(held[i], at, [k]), *held[i + 1 :]]
             if (fewer := _freedoms(mechanism, more, at.poses)) < freedoms:
                 held, freedoms = more, fewer
                 value = f"{at.coordinates[joint.name, k]:.4g} {coordinate.unit}"
@@ -143,7 +143,7 @@ def _anywhere(
     )
 
 
-def _held(joint: Constraint, at: Assembly, numbers: Sequence[int]) -> Constraint:
+def _with_prescribed_coordinates(joint: Constraint, at: Assembly, numbers: Sequence[int]) -> Constraint:
     """Return a joint with some coordinates prescribed where an assembly has them."""
     return replace(joint, values={**joint.values, **{k: at.coordinates[joint.name, k] for k in numbers}})
 

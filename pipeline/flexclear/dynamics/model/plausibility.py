@@ -16,7 +16,7 @@ from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.stops import End
 from flexclear.scene.loads import Gravity, SpringDamper
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import loose
+from flexclear.scene.variants import replaceable_contacts
 from flexclear.system.errors import InputError, errors_from
 
 #: frames closer than this fraction of the mechanism's size are at one point; penetrations below this fraction of
@@ -117,7 +117,7 @@ def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
         outer, inner = joint.surfaces
         problem = f"the {inner} starts with a penetration of {length(depth)} into the {outer}"
         remedy = f"lower the {outer}"
-    elif contact.name in loose(scene):
+    elif contact.name in replaceable_contacts(scene):
         remedy = "start the joint as without clearance ([start] at = 'ideal'), " + remedy
     raise InputError(
         f"[{contact.place}]",

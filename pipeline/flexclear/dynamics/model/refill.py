@@ -16,11 +16,11 @@ import numpy as np
 from flexclear.dynamics.drives.pieces import pieces_of
 from flexclear.dynamics.effects.declared import EFFECTS
 from flexclear.dynamics.model.closing import CLOSED_EXACTLY
-from flexclear.dynamics.model.driving import Prescribed, prescribed
+from flexclear.dynamics.model.driving import Prescribed, prescribed_coordinates
 from flexclear.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.dynamics.model.merge import rigid_inertia
 from flexclear.dynamics.model.mobility import moves
-from flexclear.dynamics.model.model import Model, filled
+from flexclear.dynamics.model.model import Model, fill_model
 from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.fields import Part
 from flexclear.scene.formulas import formula
@@ -40,7 +40,7 @@ CHANGEABLE |= {key for effect in EFFECTS for key in effect.changeable}
 CHANGEABLE |= {"title", "description", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view"}
 
 
-def refilled(model: Model, scene: Scene) -> Model | None:
+def refill_model(model: Model, scene: Scene) -> Model | None:
     """Return the model of `scene`, equal to a new one; None when it must be built anew.
 
     model: of a scene without laws given from outside.  Raises InputError as `tabulate` does.
@@ -50,29 +50,31 @@ def refilled(model: Model, scene: Scene) -> Model | None:
     clearances = scene.contacts()
     contacts = [c._replace(joint=clearances[c.name]) if c.name in clearances else c for c in model.contacts]
     mechanism = replace(model.mechanism, contacts=contacts)
-    weighed = _weighed(mechanism, scene) if scene.body != model.scene.body else mechanism
+    weighed = _with_masses(mechanism, scene) if scene.body != model.scene.body else mechanism
     if weighed is None:
         return None
     mechanism = replace(weighed, scene=scene)
     old = model.numbering
     numbering = replace(old, mechanism=mechanism, sites=list(old.sites), ports=list(old.ports))
-    made = filled(mechanism, numbering, like=model)
+    made = fill_model(mechanism, numbering, like=model)
     # other kinds of laws need other kernels, other variables have other indices in the state, and a drive that begins
     # to move may contradict another one
-    alike = (made.parts, made.ny, _moving(made)) == (model.parts, model.ny, _moving(model))
+    alike = (made.parts, made.ny, _drives_vary(made)) == (model.parts, model.ny, _drives_vary(model))
     return made if alike else None
 
 
 def _same_structure(model: Model, scene: Scene) -> bool:
     old = model.scene
-    if not all(_alike(getattr(scene, table), getattr(old, table), table) for table in Scene.model_fields):
+    if not all(
+        _differ_only_in_changeable(getattr(scene, table), getattr(old, table), table) for table in Scene.model_fields
+    ):
         return False
     # the mechanism's size is that of its points, unless a clearance is larger
     clearances = [joint.clearance for one in (old, scene) for joint in one.contacts().values()]
     return all(clearance < min(model.mechanism.components.lengths) for clearance in clearances)
 
 
-def _alike(new: Any, was: Any, path: str) -> bool:
+def _differ_only_in_changeable(new: Any, was: Any, path: str) -> bool:
     """Return True when two values differ only in keys of `CHANGEABLE`, which neither appear nor disappear.
 
     Texts name frames and coordinates, or write formulas.
@@ -83,9 +85,15 @@ def _alike(new: Any, was: Any, path: str) -> bool:
     if type(new) is not type(was):
         return False
     if isinstance(was, Part):
-        return all(_alike(getattr(new, key), value, f"{path}.{key}") for key, value in was if key != "source")
+        return all(
+            _differ_only_in_changeable(getattr(new, key), value, f"{path}.{key}")
+            for key, value in was
+            if key != "source"
+        )
     if isinstance(was, dict):
-        return [*new] == [*was] and all(_alike(new[name], value, path) for name, value in was.items())
+        return [*new] == [*was] and all(
+            _differ_only_in_changeable(new[name], value, path) for name, value in was.items()
+        )
     return bool(new == was)
 
 
@@ -93,13 +101,13 @@ def _is_text(value: Any) -> bool:
     return isinstance(value, str) or (isinstance(value, tuple) and any(isinstance(one, str) for one in value))
 
 
-def _read(scene: Scene, load: str) -> set[str]:
+def _names_read(scene: Scene, load: str) -> set[str]:
     """Return the names of bodies and frames that a load's expression reads."""
     written = formula(scene, load)
     return {name for _, name in written.reads} if written else set()
 
 
-def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
+def _with_masses(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
     """Return the mechanism with the masses of a scene; None when these change more than numbers.
 
     They do when a link has its frame at its centre of mass, when closing moves the link, when an expression reads the
@@ -107,7 +115,7 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
     """
     old = mechanism.scene.body
     changed = {name for name, body in scene.body.items() if body is not old[name]}
-    if changed & {name for load in scene.load for name in _read(scene, load)}:
+    if changed & {name for load in scene.load for name in _names_read(scene, load)}:
         return None
     links = list(mechanism.links)
     for i, link in enumerate(links):
@@ -135,18 +143,18 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
 
 def _same_start(model: Model, scene: Scene) -> bool:
     """Return True when the drives have the same start as before, so that the links do, too."""
-    pairs = zip(prescribed(model.scene), prescribed(scene), strict=True)
+    pairs = zip(prescribed_coordinates(model.scene), prescribed_coordinates(scene), strict=True)
     changed = [(was, new) for was, new in pairs if was.law is not new.law]
     try:
-        return all(_at_start(was, scene) == _at_start(new, scene) for was, new in changed)
+        return all(_law_at_start(was, scene) == _law_at_start(new, scene) for was, new in changed)
     except ValueError:
         return False  # an impossible law, which a new model reports
 
 
-def _at_start(one: Prescribed, scene: Scene) -> float:
+def _law_at_start(one: Prescribed, scene: Scene) -> float:
     return pieces_of(one.law, one.dimension).value(scene.time.start)
 
 
-def _moving(model: Model) -> tuple[bool, ...]:
+def _drives_vary(model: Model) -> tuple[bool, ...]:
     """Return the names of the drives that are not constant."""
     return tuple(moves(model, name) for name in model.drives)

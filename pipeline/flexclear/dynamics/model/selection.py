@@ -73,7 +73,7 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
     mobility = np.sum(inverse**2, axis=0)  # diagonal of M^-1
     for c in arrays.table(m.CLOSURES):
         total: np.ndarray = np.zeros(c["n_rows"])
-        for part, (site, turning, ratio) in enumerate(_acting(model, c)):
+        for part, (site, turning, ratio) in enumerate(_second_sites(model, c)):
             mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
             mine = mine[mine["part"] == part]
             turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
@@ -86,7 +86,7 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
     return lengths
 
 
-def _acting(model: Model, c: Any) -> list[tuple[int, np.ndarray, float]]:
+def _second_sites(model: Model, c: Any) -> list[tuple[int, np.ndarray, float]]:
     """Return per part of a closure (row of CLOSURES): second site, mask of its rotational rows, and their factor."""
     arrays, k = model.arrays, c["coupling"]
     if k < 0:
@@ -120,7 +120,7 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
     h[m.N_KEPT_ROWS], h[m.SCHUR_SIZE] = start, envelope_size(envelope[:start])
 
 
-def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
+def dense_rows(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
     """Return selected rows by free coordinates, (..., kept, nv), from the supports that the kernels store.
 
     stored: JACOBIAN or SPREAD of the work space, shape (..., size).

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.dynamics.model import given_start
-from flexclear.dynamics.model.assembly import assembled, with_starts
+from flexclear.dynamics.model.assembly import assemble, with_starts
 from flexclear.dynamics.model.constraints import Constraint, constraints
 from flexclear.dynamics.model.driving import label
 from flexclear.dynamics.model.mechanism import Mechanism, build
@@ -69,16 +69,16 @@ def start_pose(
     """
     mechanism, refused = build(placed, bundles), None
     try:
-        mechanism = assembled(mechanism)
+        mechanism = assemble(mechanism)
     except InputError as error:
-        refused, mechanism = error, _open(mechanism)
+        refused, mechanism = error, _with_open_loops(mechanism)
     starts = given_coordinates(placed)
     poses = [link.start for link in mechanism.links]
     gaps = [] if refused is None else _gaps(mechanism, constraints(mechanism, starts=starts), poses)
-    return StartPose(_data(scene, mechanism, drawn), (*gaps, *_loose(mechanism)), refused)
+    return StartPose(_data(scene, mechanism, drawn), (*gaps, *_gaps_of_loose_joints(mechanism)), refused)
 
 
-def _open(mechanism: Mechanism) -> Mechanism:
+def _with_open_loops(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with each body without a pose put where one joint has it; loops may stay open."""
     starts, placed = given_coordinates(mechanism.scene), given_start.given_links(mechanism)
     joints = constraints(mechanism, starts=starts)
@@ -102,7 +102,7 @@ def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Pl
     return result
 
 
-def _loose(mechanism: Mechanism) -> list[Gap]:
+def _gaps_of_loose_joints(mechanism: Mechanism) -> list[Gap]:
     """Return gaps of balls and pins that start outside their sockets."""
     result = []
     for contact, _, away, inner in separations(mechanism):

@@ -47,10 +47,10 @@ def given_coordinates(scene: Scene) -> list[Given]:
     Raises InputError for unknown joints and coordinates, and for units that do not fit.
     """
     joints = scene.start.joint if scene.start is not None else {}
-    return together(partial(_given, scene, joint, name) for joint, named in joints.items() for name in named)
+    return together(partial(_given_start, scene, joint, name) for joint, named in joints.items() for name in named)
 
 
-def _given(scene: Scene, joint: str, name: str) -> Given:
+def _given_start(scene: Scene, joint: str, name: str) -> Given:
     assert scene.start is not None
     start = scene.start.joint[joint][name]
     path = f"[start.joint.{joint}.{name}]" if name else f"[start.joint.{joint}]"
@@ -78,10 +78,10 @@ def given_modes(scene: Scene, bundles: Mapping[str, Labelled], key: str = "coord
         known = suggestion(name, scene.flexible()) if scene.flexible() else "the scene has no flexible body"
         raise InputError(f"[start.modal.{name}]", f"there is no flexible body '{name}'", known)
     values = {name: getattr(start, key) for name, start in given.items() if "mode" in bundles[name].sizes}
-    return {name: _padded(bundles[name], name, key, one) for name, one in values.items() if one is not None}
+    return {name: _pad_to_modes(bundles[name], name, key, one) for name, one in values.items() if one is not None}
 
 
-def _padded(bundle: Labelled, name: str, key: str, values: tuple[float, ...]) -> np.ndarray:
+def _pad_to_modes(bundle: Labelled, name: str, key: str, values: tuple[float, ...]) -> np.ndarray:
     modes = bundle.sizes["mode"]
     if len(values) > modes:
         raise InputError(

@@ -30,7 +30,7 @@ from flexclear.scene.load import edited
 from flexclear.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.scene.quantity import KINDS, OF_CLEARANCE, Quantity, parse
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, pruned, uncoupled
+from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, uncoupled, without_parts
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress, silent
 
@@ -69,7 +69,7 @@ def plan(
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
     uncoupled_parts = uncoupled(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
     plain = edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
-    bare = pruned(plain, uncoupled_parts)
+    bare = without_parts(plain, uncoupled_parts)
     own, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
     runs = ScreeningRuns(bare, own, less, filled, quantities, progress)
     _ = runs.extent  # refuses a scene that cannot be built, before anything is run

@@ -17,7 +17,7 @@ from flexclear.dynamics.plan.screening_runs import (
     TAKES_LONG,
     ScreeningRuns,
 )
-from flexclear.dynamics.run.progress_rate import AFFORDABLE, unverified
+from flexclear.dynamics.run.progress_rate import AFFORDABLE, scene_without_comparison
 from flexclear.scene.integrators import DEFAULT, STIFF
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import Effect
@@ -110,7 +110,12 @@ def scene_is_cheaper(search: Search, chosen: Chosen) -> bool:
     taken = limit if TAKES_LONG in full.refused else full.evaluations
     if scene.by_need() and taken > fraction * AFFORDABLE:
         full = runs.point(
-            (), fraction=fraction, members=0, integrator=STIFF, rtol=unverified(scene).solver.rtol, evaluations=limit
+            (),
+            fraction=fraction,
+            members=0,
+            integrator=STIFF,
+            rtol=scene_without_comparison(scene).solver.rtol,
+            evaluations=limit,
         )
         taken = limit if TAKES_LONG in full.refused else full.evaluations
     if planned.refused or not taken:

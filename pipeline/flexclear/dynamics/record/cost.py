@@ -16,7 +16,7 @@ import xarray as xr
 from flexclear.dynamics.record.dataset import recorded
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.ledger import require_closed
-from flexclear.dynamics.run.run import Run, engines, follow, judged, observed
+from flexclear.dynamics.run.run import Run, engines, follow, observe_run, rows_to_judge
 from flexclear.dynamics.run.trajectory import Followed
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import Progress, silent
@@ -59,12 +59,12 @@ def measure(
 
     first = _once(integrate)
     last, trajectory, switched = runs[0]
-    seen = observed(last, trajectory)
+    seen = observe_run(last, trajectory)
     if checked:
-        require_closed(last.model, *judged(last, trajectory, seen))
+        require_closed(last.model, *rows_to_judge(last, trajectory, seen))
 
     def record() -> xr.Dataset:
-        return recorded(Run(scene, last, trajectory, observed(last, trajectory), None, switched)).to_xarray()
+        return recorded(Run(scene, last, trajectory, observe_run(last, trajectory), None, switched)).to_xarray()
 
     run, recording = record(), _repeated(record, 0)
     return Cost(run, _repeated(integrate, MOST_REPEATS, (first,)), recording, engine.model.length)

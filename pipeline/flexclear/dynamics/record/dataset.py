@@ -14,7 +14,7 @@ from flexclear.artifacts.labelled import LabelledArrays, labelled
 from flexclear.artifacts.schema import RUN, conformed
 from flexclear.dynamics.effects.citations import references
 from flexclear.dynamics.equations.observation import Observed, Series, Variables
-from flexclear.dynamics.model.driving import prescribed
+from flexclear.dynamics.model.driving import prescribed_coordinates
 from flexclear.dynamics.model.internal_states import named_states
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import doubts
@@ -303,7 +303,7 @@ def _drives(scene: Scene, model: Model, seen: Observed) -> Series:
     if not names:
         return {}, {}
     force, position = model.drive_signs * seen.drive_force, model.drive_signs * seen.positions[:, model.nq :]
-    turning = {coordinate.name: coordinate.dimension == "angle" for coordinate in prescribed(model.scene)}
+    turning = {coordinate.name: coordinate.dimension == "angle" for coordinate in prescribed_coordinates(model.scene)}
     sharing = [name for name in model.scene.forces() if name not in scene.load]
     if sharing:  # actuators beyond the freedoms, which are loads in the engine
         from flexclear.dynamics.record.loads import along_coordinates, turning_loads

@@ -25,11 +25,11 @@ from flexclear.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.dynamics.run.evaluation.engine import Engine, another
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.horizon.horizon import offset_jacobian, perturbed
+from flexclear.dynamics.run.horizon.horizon import offset_jacobian, perturbed_start
 from flexclear.dynamics.run.ledger import require_closed
 from flexclear.dynamics.run.pieces import digest
-from flexclear.dynamics.run.progress_rate import DearError, affordable, unverified
-from flexclear.dynamics.run.run import engines, follow, judged, observed, require_shallow
+from flexclear.dynamics.run.progress_rate import DearError, affordable, scene_without_comparison
+from flexclear.dynamics.run.run import engines, follow, observe_run, require_shallow, rows_to_judge
 from flexclear.dynamics.run.trajectory import Trajectory
 from flexclear.scene.event_kinds import CLOSING
 from flexclear.scene.limits import require_scatter
@@ -59,7 +59,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         return _members(scene, bundles, progress)
     except DearError as dear:
         progress(None, str(dear))
-        return _members(unverified(scene), bundles, progress)
+        return _members(scene_without_comparison(scene), bundles, progress)
 
 
 def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
@@ -71,7 +71,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     select_rows(engine, start, engine.start)
     jacobian = offset_jacobian(engine, start)
     offsets = ball_offsets(engine.model, requested, requested.members)
-    starts = [perturbed(engine, start, jacobian, moved) for moved in offsets]
+    starts = [perturbed_start(engine, start, jacobian, moved) for moved in offsets]
     making, judges, stored = Lock(), affordable(scene), journal.current()
     piece = digest(engine, *starts) if stored is not None else ""
 
@@ -168,9 +168,9 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> Member:
     regular = engine.output_times(model.scene.output.interval)
     peak, count, fraction = _contact_statistics(engine, trajectory)
     rows = np.searchsorted(trajectory.time, regular)
-    seen = observed(engine, trajectory)
+    seen = observe_run(engine, trajectory)
     require_shallow(model, trajectory, seen)
-    throughout = judged(engine, trajectory, seen)
+    throughout = rows_to_judge(engine, trajectory, seen)
     require_closed(model, *throughout)
     speed = np.linalg.norm(throughout[1].body_velocity, axis=2).max(axis=0)
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)

@@ -13,7 +13,7 @@ from flexclear.dynamics.model.flexible_bodies import second_first_moment, second
 from flexclear.dynamics.model.interface_basis import frame_index
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
-from flexclear.numerics.rotations import continued, cross, turned
+from flexclear.numerics.rotations import cross, rotate, without_sign_jumps
 from flexclear.scene.parts import RigidBody
 
 
@@ -34,14 +34,14 @@ class Motion:
 
     def at(self, arm: np.ndarray, turn: np.ndarray | None = None) -> Motion:
         """Return the motion of a fixed point `arm` (3,) and of axes turned by `turn` (3, 3), given in the body."""
-        r = turned(self.R, arm)
+        r = rotate(self.R, arm)
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing)
         return Motion(self.p + r, self.R if turn is None else self.R @ turn, self.v + swing, self.omega, a, self.alpha)
 
     def moving(self, arm: np.ndarray, rate: np.ndarray, second: np.ndarray) -> Motion:
         """Return the motion of a point that moves in the body: its position, rate and second rate there, (time, 3)."""
-        r, s, t = (turned(self.R, x) for x in (arm, rate, second))
+        r, s, t = (rotate(self.R, x) for x in (arm, rate, second))
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing + 2.0 * s) + t
         return Motion(self.p + r, self.R, self.v + swing + s, self.omega, a, self.alpha)
@@ -156,7 +156,7 @@ class Motions:
                 label = name.partition(".")[2]
                 S = bundle["frame_translation_shape"].values[frame_index(bundle, label)]
                 bent = placement.p + self.modal(i).shift(S, second_motion(self.model.mechanism, i, label)[0])[0]
-                positions[:, k] = link.p + turned(link.R, bent)
+                positions[:, k] = link.p + rotate(link.R, bent)
         return positions
 
     @cached_property
@@ -174,7 +174,7 @@ class Motions:
             S, P = (bundle[f"frame_{k}_shape"].values[at] for k in ("translation", "rotation"))
             move, turn = second_motion(self.model.mechanism, i, label)
             arm, rate, second = state.shift(S, move)
-            turning = turned(link.R, _angular_velocity(*state.shift(P, turn)[:2]))
+            turning = rotate(link.R, _angular_velocity(*state.shift(P, turn)[:2]))
             velocities[name] = link.moving(placement.p + arm, rate, second).v, link.omega + turning
         return velocities
 
@@ -200,7 +200,7 @@ def motion_series(bodies: Bodies, origin: np.ndarray) -> Variables:
     """Return position, orientation, velocities and acceleration of several bodies over time, by variable."""
     series = {
         ("position", "axis"): shifted(bodies.position, origin),
-        ("quaternion", "quat"): continued(bodies.quaternion),
+        ("quaternion", "quat"): without_sign_jumps(bodies.quaternion),
         ("velocity", "axis"): bodies.velocity,
         ("angular_velocity", "axis"): bodies.omega,
         ("acceleration", "axis"): bodies.acceleration,

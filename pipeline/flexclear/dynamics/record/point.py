@@ -21,12 +21,12 @@ from flexclear.dynamics.run.alike import engines_alike
 from flexclear.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.horizon.horizon import offset_jacobian, perturbed
-from flexclear.dynamics.run.horizon.periods import Cursor, periods, stretches
+from flexclear.dynamics.run.horizon.horizon import offset_jacobian, perturbed_start
+from flexclear.dynamics.run.horizon.periods import Cursor, parts_of_period, periods
 from flexclear.dynamics.run.horizon.repetition import require_periodic
 from flexclear.dynamics.run.ledger import require_closed
-from flexclear.dynamics.run.progress_rate import DearError, affordable, unverified
-from flexclear.dynamics.run.run import follow, judged, observed, require_shallow
+from flexclear.dynamics.run.progress_rate import DearError, affordable, scene_without_comparison
+from flexclear.dynamics.run.run import follow, observe_run, require_shallow, rows_to_judge
 from flexclear.dynamics.run.trajectory import Trajectory
 from flexclear.scene.load import with_numbers
 from flexclear.scene.quantity import MAGNITUDES, Recorded
@@ -72,12 +72,12 @@ class Runner:
         place: where its steps may be evaluated together with those of other points, with the same bits.  alive: called
         now and then; an exception from it ends the work.
         """
-        scene = thinned(scene, self.recorded)
+        scene = with_fewest_outputs(scene, self.recorded)
         try:
             try:
                 rows, count = self._rows(scene, place, alive)
             except DearError:
-                scene = unverified(scene)
+                scene = scene_without_comparison(scene)
                 rows, count = self._rows(scene, place, alive)
             values, deviation = _statistics(rows)
             if not self.error:
@@ -98,7 +98,7 @@ class Runner:
         if scene.event:
             return False
         try:
-            self._engines(thinned(scene, self.recorded))
+            self._engines(with_fewest_outputs(scene, self.recorded))
         except (SolverError, InputError):
             return False  # each point reports the error itself
         return self.engine is not None and self.engine.staged
@@ -155,7 +155,7 @@ class Runner:
         offsets = ball_offsets(model, given or difference_of_starts(engine, start), self.first + self.members)
         per_length = np.ones(len(model.contacts)) if given else 1.0 / arms(model.mechanism)
         return [
-            perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3))
+            perturbed_start(engine, start, jacobian, moved * np.repeat(per_length, 3))
             for moved in list(offsets)[self.first :]
         ]
 
@@ -174,7 +174,7 @@ def in_sections(recorded: Sequence[Recorded]) -> bool:
     return any(one.reduction == "sections" for one in recorded)
 
 
-def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
+def with_fewest_outputs(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     """Return the scene with no more regular outputs than the recorded quantities need."""
     if in_sections(recorded):
         # only the states at the waypoints of a period are examined
@@ -186,9 +186,9 @@ def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
 
 
 def _recorded_values(scene: Scene, engine: Engine, trajectory: Trajectory, recorded: Sequence[Recorded]) -> Values:
-    seen = observed(engine, trajectory)
+    seen = observe_run(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
-    require_closed(engine.model, *judged(engine, trajectory, seen))
+    require_closed(engine.model, *rows_to_judge(engine, trajectory, seen))
     events = {} if all(one.quantity.over_time for one in recorded) else events_of(engine.model, trajectory)
     terms = {term for one in recorded for term in one.quantity.terms()}
     arrays = variables_for(scene, Motions(engine.model, seen), terms, trajectory.time, events)
@@ -200,7 +200,7 @@ def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regul
     values: Values = {}
     for one in recorded:
         if one.quantity.over_time:
-            values[one.name] = _recorded(one, time, quantities.series(run, one.quantity), regular)
+            values[one.name] = _reduce_series(one, time, quantities.series(run, one.quantity), regular)
         elif one.reduction == "series":
             values[one.name] = quantities.so_far(run, one.quantity, regular, time)
         elif one.quantity.kind == "impact_times":
@@ -210,7 +210,7 @@ def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regul
     return values
 
 
-def _recorded(one: Recorded, time: np.ndarray, over_time: np.ndarray, regular: np.ndarray) -> np.ndarray:
+def _reduce_series(one: Recorded, time: np.ndarray, over_time: np.ndarray, regular: np.ndarray) -> np.ndarray:
     """Return the recorded value of a series, shape (time, ...); regular: rows of the regular output times."""
     value = over_time[regular] if one.reduction == "series" else reduced(time, over_time, one.reduction)
     return np.asarray(value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0])
@@ -219,7 +219,7 @@ def _recorded(one: Recorded, time: np.ndarray, over_time: np.ndarray, regular: n
 def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:
     """Return the recorded values once per period, after the transient, and the evaluations of all periods."""
     requested, period = scene.sections or Sections(), section_period(scene)
-    start, parts = consistent_start(engine), stretches(engine, period, requested.phase)
+    start, parts = consistent_start(engine), parts_of_period(engine, period, requested.phase)
     require_periodic(parts, start)
     sampled_at = next(k for k, part in enumerate(parts) if part.start == engine.start + requested.phase)
     values, evaluations = dict[str, list[np.ndarray]](), 0
@@ -228,7 +228,7 @@ def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive:
         evaluations += sum(trajectory.counters["evaluations"] for trajectory in done.parts)
         if done.number >= requested.transient:
             here = done.parts[sampled_at]
-            motions = Motions(engine.model, observed(parts[sampled_at], replace(here, rows=here.rows[:1])))
+            motions = Motions(engine.model, observe_run(parts[sampled_at], replace(here, rows=here.rows[:1])))
             known = series(scene, motions, {one.quantity for one in recorded}, here.time[:1])
             for one in recorded:
                 row = known[one.quantity.name][0]

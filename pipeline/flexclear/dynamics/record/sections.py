@@ -25,12 +25,12 @@ from flexclear.dynamics.run.horizon.periods import (
     NEIGHBOUR,
     Cursor,
     Period,
+    parts_of_period,
     periods,
-    stretches,
 )
 from flexclear.dynamics.run.horizon.repetition import require_periodic
 from flexclear.dynamics.run.pieces import digest, memory, remember
-from flexclear.dynamics.run.run import engines, observed
+from flexclear.dynamics.run.run import engines, observe_run
 from flexclear.dynamics.run.trajectory import Trajectory
 from flexclear.scene.load import edited
 from flexclear.scene.loads import SampledPid
@@ -101,7 +101,7 @@ def repeated(engine: Engine, start: np.ndarray) -> list[Engine]:
                 "a sampled controller counts its periods from the start of the run, which sections repeat",
                 "use a continuous 'pid' here",
             )
-    parts = stretches(engine, section_period(scene), (scene.sections or Sections()).phase)
+    parts = parts_of_period(engine, section_period(scene), (scene.sections or Sections()).phase)
     require_periodic(parts, start)
     return parts
 
@@ -144,7 +144,7 @@ class _Tape:
 
     def _motion(self, part: Engine, trajectory: Trajectory, rows: np.ndarray) -> dict[str, np.ndarray]:
         """Return the motion of the recorded bodies, and the contacts' offsets, at some rows."""
-        seen, model = observed(part, replace(trajectory, rows=trajectory.rows[rows])), part.model
+        seen, model = observe_run(part, replace(trajectory, rows=trajectory.rows[rows])), part.model
         series = motion_series(Motions(model, seen).several(self.names), model.mechanism.origin)
         offsets = {"contact_offset": seen.touch["offset"].copy()} if model.contacts else {}
         return {name: values for name, (_, values) in series.items()} | offsets

@@ -65,15 +65,15 @@ def record(motions: Motions, names: tuple[str, ...]) -> Series:
         if name not in rods and name not in solids:
             raise InputError("[output] stress", f"the bundle of '{name}' has no stresses", "compute it from the scene")
     variables, coordinates, gauged = Variables(), dict[str, object](), dict[str, Gauged]()
-    for those, made in ((rods, _of_rods), (solids, _of_solids)):
+    for those, made in ((rods, _section_forces_of_rods), (solids, _stress_factors_of_solids)):
         if those:
             more, named = made(motions, those, gauged)
             variables, coordinates = variables | more, coordinates | named
-    more, named = _of_gauges(gauged) if gauged else ({}, {})
+    more, named = _gauge_series(gauged) if gauged else ({}, {})
     return variables | more, coordinates | named
 
 
-def _of_gauges(gauged: Mapping[str, Gauged]) -> Series:
+def _gauge_series(gauged: Mapping[str, Gauged]) -> Series:
     stress = np.concatenate([body.stress for body in gauged.values()], axis=1)
     dims = ("time", "gauge")
     variables: Variables = {"von_mises_stress": (dims, von_mises(stress))}
@@ -89,13 +89,13 @@ def _of_gauges(gauged: Mapping[str, Gauged]) -> Series:
     }
 
 
-def _of_solids(motions: Motions, solids: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
+def _stress_factors_of_solids(motions: Motions, solids: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
     """Return the factors of the stress fields; store the stresses at gauges in `gauged`."""
     every, fields, owners = [], list[str](), list[str]()
     for body, bundle in solids.items():
         factor = factors(bundle, *motion_and_loads(motions, body))
         gauges = gauge_nodes(bundle)
-        stress, node = largest(bundle["stress_field"].values, factor, list(gauges.values()))
+        stress, node = largest_stress_by_group(bundle["stress_field"].values, factor, list(gauges.values()))
         names = [f"{body}.{name}" if name else body for name in gauges]
         gauged[body] = Gauged(names, stress, bundle["node_position"].values[node])
         every.append(factor)
@@ -107,7 +107,7 @@ def _of_solids(motions: Motions, solids: Mapping[str, Labelled], gauged: dict[st
     }
 
 
-def _of_rods(motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
+def _section_forces_of_rods(motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
     """Return section forces and peak stresses; the latter only when all sections have a known outline.
 
     Stores the largest stress of all sections in `gauged`, at the centre of its section.
@@ -182,8 +182,8 @@ def section_forces(bundle: Labelled, motion: Motion, moment: np.ndarray, force: 
     spin, push = _inertia(bundle, motion)
     F = np.einsum("sf,tfi->tsi", frames, force) - np.einsum("sp,tpi->tsi", slices, push, optimize=True)
     M = np.einsum("sf,tfi->tsi", frames, moment) - np.einsum("sp,tpi->tsi", slices, spin, optimize=True)
-    centre = bundle["section_position"].values + _moved(bundle, "section_translation_shape", motion.q)
-    R_BS = _turn(_moved(bundle, "section_rotation_shape", motion.q)) @ bundle["section_rotation"].values
+    centre = bundle["section_position"].values + _displacements(bundle, "section_translation_shape", motion.q)
+    R_BS = _turn(_displacements(bundle, "section_rotation_shape", motion.q)) @ bundle["section_rotation"].values
     M = M - np.cross(centre, F)
     return np.concatenate([np.einsum("tsij,tsi->tsj", R_BS, part) for part in (F, M)], axis=-1)
 
@@ -198,30 +198,30 @@ def peak_stresses(bundle: Labelled, forces: np.ndarray) -> tuple[np.ndarray, np.
     axial, mises, stress = np.empty(forces.shape[:2]), np.empty(forces.shape[:2]), np.zeros(forces.shape)
     maps, is_round = bundle["fibre_stress"].values, bundle["section_round"].values
     for s, fibres in enumerate(maps):
-        angle = _bending(forces[:, s]) * is_round[s]
-        loads = _turned(forces[:, s], angle) if is_round[s] else forces[:, s]
+        angle = _bending_angle(forces[:, s]) * is_round[s]
+        loads = _forces_in_turned_axes(forces[:, s], angle) if is_round[s] else forces[:, s]
         sigma, tau_y, tau_z = np.moveaxis(np.einsum("fcl,tl->tfc", fibres, loads, optimize=True), -1, 0)
-        axial[:, s] = _at(sigma, first_largest(np.abs(sigma), axis=1))
+        axial[:, s] = _pick_by_row(sigma, first_largest(np.abs(sigma), axis=1))
         size = np.sqrt(sigma**2 + 3.0 * (tau_y**2 + tau_z**2))
         worst, c, d = np.argmax(size, axis=1), np.cos(angle), np.sin(angle)
-        mises[:, s] = _at(size, worst)
-        along, y, z = (_at(values, worst) for values in (sigma, tau_y, tau_z))
+        mises[:, s] = _pick_by_row(size, worst)
+        along, y, z = (_pick_by_row(values, worst) for values in (sigma, tau_y, tau_z))
         stress[:, s, 0], stress[:, s, 4], stress[:, s, 5] = along, d * y + c * z, c * y - d * z
     return axial, mises, stress
 
 
-def _at(values: np.ndarray, column: np.ndarray) -> np.ndarray:
+def _pick_by_row(values: np.ndarray, column: np.ndarray) -> np.ndarray:
     """Return one value of each row."""
     result: np.ndarray = values[np.arange(len(values)), column]
     return result
 
 
-def _bending(forces: np.ndarray) -> np.ndarray:
+def _bending_angle(forces: np.ndarray) -> np.ndarray:
     """Return the angle from y to the fibre with the largest tension by bending; forces: (time, 6)."""
     return np.arctan2(forces[:, 4], -forces[:, 5])
 
 
-def _turned(forces: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def _forces_in_turned_axes(forces: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Return forces (time, 6) in axes turned about x by an angle."""
     c, s = np.cos(angle), np.sin(angle)
     turned = forces.copy()
@@ -233,8 +233,8 @@ def _turned(forces: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 def _inertia(bundle: Labelled, motion: Motion) -> Wrench:
     """Return each slice's rate of momentum minus weight: moment about the body's origin, force, (time, slice, 3)."""
-    S = [_moved(bundle, "slice_translation_shape", x) for x in (motion.q, motion.u, motion.du)]
-    theta = [skew(_moved(bundle, "slice_rotation_shape", x)) for x in (motion.q, motion.u, motion.du)]
+    S = [_displacements(bundle, "slice_translation_shape", x) for x in (motion.q, motion.u, motion.du)]
+    theta = [skew(_displacements(bundle, "slice_rotation_shape", x)) for x in (motion.q, motion.u, motion.du)]
     a, omega, alpha = (x[:, None] for x in (motion.a, motion.omega, motion.alpha))
     r = bundle["slice_position"].values + S[0]
     swing = np.cross(omega, np.cross(omega, r) + 2.0 * S[1])
@@ -248,7 +248,7 @@ def _inertia(bundle: Labelled, motion: Motion) -> Wrench:
     return np.cross(r, force) + own, force
 
 
-def _moved(bundle: Labelled, name: str, q: np.ndarray) -> np.ndarray:
+def _displacements(bundle: Labelled, name: str, q: np.ndarray) -> np.ndarray:
     """Return shapes (point, 3, mode) times coordinates (time, mode): (time, point, 3)."""
     return np.einsum("pim,tm->tpi", bundle[name].values, q, optimize=True)
 
@@ -282,7 +282,7 @@ def on_displaced_frames(bundle: Labelled, motion: Motion, moment: np.ndarray, fo
 
     moment, force: as `motion_and_loads` returns them.
     """
-    origins = bundle["frame_position"].values + _moved(bundle, "frame_translation_shape", motion.q)
+    origins = bundle["frame_position"].values + _displacements(bundle, "frame_translation_shape", motion.q)
     return np.concatenate([force, moment - np.cross(origins, force)], axis=2)
 
 
@@ -294,7 +294,9 @@ def gauge_nodes(bundle: Labelled) -> dict[str, np.ndarray]:
     return nodes
 
 
-def largest(field: np.ndarray, factor: np.ndarray, groups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def largest_stress_by_group(
+    field: np.ndarray, factor: np.ndarray, groups: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
     """Return each group's stress at its node of largest von Mises stress (time, group, 6), and that node (time, group).
 
     field: shape (node, 6, field).  factor: shape (time, field).

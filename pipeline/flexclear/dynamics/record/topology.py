@@ -27,7 +27,7 @@ def topology(run: Run) -> Series:
     redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
     rows, nv = len(trajectory.rows), engine.model.nv
-    indicators = _singular_values(engine, trajectory, seen, closure_rows.scaled)
+    indicators = _singular_values(engine, trajectory, seen, closure_rows.scale_rows)
     rank = np.full(rows, indicators.shape[1], dtype=np.int32)
     if indicators.shape[1]:
         least = np.maximum(indicators[:, -1], indicators[:, 0] / INFINITE)
@@ -59,7 +59,7 @@ def _singular_values(
         engine.keep(selected)
         stored = seen.jacobian[part]
         for first in range(0, max(len(stored), 1), ROWS_AT_ONCE):
-            J = selection.dense(engine.model, engine.h, stored[first : first + ROWS_AT_ONCE])
+            J = selection.dense_rows(engine.model, engine.h, stored[first : first + ROWS_AT_ONCE])
             parts.append(_values(scale(engine.model, engine.h, J)))
     return np.concatenate(parts)
 

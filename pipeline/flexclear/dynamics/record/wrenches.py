@@ -105,22 +105,22 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
     model, rows, inside = motions.model, len(motions.seen.state), dict[str, Wrench]()
     beyond = list[tuple[str, list[str], float]]()  # bodies on the far side; +1 where they are the second body's
     for link in model.links:
-        others = {name: _joined(model, name) for name in model.scene.joint if name not in known}
+        others = {name: _bodies_of_joint(model, name) for name in model.scene.joint if name not in known}
         inner = [name for name, bodies in others.items() if link.placements.keys() >= set(bodies)]
         # a redundant joint between bodies of one link gets a zero wrench
         inside |= {name: (np.zeros((rows, 3)), np.zeros((rows, 3))) for name in inner}
         tree = dict[str, tuple[str, str]]()
         for name in inner:
             a, b = others[name]
-            tree |= {} if b in reached(a, tree.values()) else {name: (a, b)}
+            tree |= {} if b in connected_bodies(a, tree.values()) else {name: (a, b)}
         for name, (a, b) in tree.items():
             rest = [pair for other, pair in tree.items() if other != name]
-            far, sign = reached(b, rest), 1.0
+            far, sign = connected_bodies(b, rest), 1.0
             if any(model.scene.body[body].type == "ground" for body in far):
-                far, sign = reached(a, rest), -1.0
+                far, sign = connected_bodies(a, rest), -1.0
             bodies = [body for body in link.placements if body in far and body in model.mechanism.moving_bodies]
             beyond += [(name, bodies, sign)] if bodies else []
-    acting = [(_joined(model, joint), wrench) for joint, wrench in known.items()]
+    acting = [(_bodies_of_joint(model, joint), wrench) for joint, wrench in known.items()]
     places = {name: k for k, name in enumerate(motions.moving_bodies)}
     for name, bodies, sign in beyond:
         demand = np.sum([motions.seen.body_demand[:, places[body]] for body in bodies], axis=0)
@@ -136,7 +136,7 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
     return inside
 
 
-def _joined(model: Model, name: str) -> tuple[str, str]:
+def _bodies_of_joint(model: Model, name: str) -> tuple[str, str]:
     """Return the two bodies of a joint; for a path, which acts from the world, an empty name and its body."""
     scene, frames = model.scene, model.mechanism.frames
     if name in scene.joint:
@@ -147,7 +147,7 @@ def _joined(model: Model, name: str) -> tuple[str, str]:
     return "", frames[path.frame].body
 
 
-def reached(start: str, pairs: Collection[tuple[str, str]]) -> set[str]:
+def connected_bodies(start: str, pairs: Collection[tuple[str, str]]) -> set[str]:
     """Return the bodies that joined pairs connect to one body, including that body."""
     there, ends = {start}, [start]
     while ends:

@@ -7,7 +7,7 @@ from functools import cache
 
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics.effects import scheme_of
-from flexclear.dynamics.model.refill import refilled
+from flexclear.dynamics.model.refill import refill_model
 from flexclear.dynamics.run.evaluation.engine import Engine, assemble
 from flexclear.dynamics.run.run import engine_of, engines
 from flexclear.scene.drives import PathDrive
@@ -24,7 +24,7 @@ def engines_alike(
     Compiled functions and checks of the known engine serve the new one.  known: engine with the same bundles; it is not
     changed.  Raises as `engines` does.
     """
-    model = None if known is None or not _may_serve(known, scene) else refilled(known.model, scene)
+    model = None if known is None or not _may_serve(known, scene) else refill_model(known.model, scene)
     if known is None or model is None:
         return engines(scene, bundles, silent)
     other = cache(lambda name: engine_of(edited(scene, {"solver.integrator": name}), bundles, silent))

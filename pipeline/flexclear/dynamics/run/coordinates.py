@@ -34,7 +34,7 @@ def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
         edge = closure.edge
         a, b = seen.sites[:, row["site_a"]], seen.sites[:, row["site_b"]]
         for index, coordinate in enumerate(joint_type(edge.kind).COORDINATES):
-            series[label(edge.name, edge.kind, index)] = _measured(a, b, coordinate)
+            series[label(edge.name, edge.kind, index)] = _loop_coordinate(a, b, coordinate)
     return {name: series[name] for name, _, _ in named_coordinates(model.scene) if name in series}
 
 
@@ -49,7 +49,7 @@ def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
     ]
 
 
-def _measured(a: np.ndarray, b: np.ndarray, coordinate: Coordinate) -> Series:
+def _loop_coordinate(a: np.ndarray, b: np.ndarray, coordinate: Coordinate) -> Series:
     """Return the coordinate of a loop-closing joint from the frames of its two sites, named fields over the rows."""
     F, G = a["axes"], b["axes"]
     along = (G if coordinate.side else F)[:, :, coordinate.axis]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model.driving import prescribed
+from flexclear.dynamics.model.driving import prescribed_coordinates
 from flexclear.dynamics.model.loads import describe
 from flexclear.dynamics.model.model import Model
 from flexclear.scene.laws import Constant
@@ -37,7 +37,7 @@ class Input:
 def inputs_of(model: Model) -> dict[str, Input]:
     """Return the inputs of a model by their paths in the scene: ``load.push.force``, ``drive.crank.law``."""
     listed = list[tuple[str, Any, int, Callable[[int], Input]]]()
-    for k, (one, sign) in enumerate(zip(prescribed(model.scene), model.drive_signs, strict=True)):
+    for k, (one, sign) in enumerate(zip(prescribed_coordinates(model.scene), model.drive_signs, strict=True)):
         made = partial(Input, sign=float(sign), dimension=one.dimension, moves=True)
         listed.append((one.place, one.law, k, made))
     for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True):

@@ -54,7 +54,7 @@ def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     Raises InputError when the actuators cannot produce the motion, or could in more than one way.
     """
     requested, names = _actuators(scene)  # all of them can be named, before anything is compiled
-    engine, start = _started(scene, bundles, progress)
+    engine, start = _consistent_engine(scene, bundles, progress)
     alone = enough(engine, start)
     trajectory, *sides = _run(engine, start, progress)
     before, after = (joint_coordinates(engine.model, seen) for seen in sides)
@@ -64,7 +64,9 @@ def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         series = label(joint, scene.joint[joint].type, k)
         laws[name] = hermite(trajectory.time, np.array(before[series]), np.array(after[series]))
     other = _with_drives(scene, requested, alone)
-    return (other, laws) if len(alone) == len(names) else _shared(other, laws, names, bundles, progress)
+    return (
+        (other, laws) if len(alone) == len(names) else _with_actuators_as_loads(other, laws, names, bundles, progress)
+    )
 
 
 def _actuators(scene: Scene) -> tuple[dict[str, PathDrive], list[str]]:
@@ -75,7 +77,7 @@ def _actuators(scene: Scene) -> tuple[dict[str, PathDrive], list[str]]:
     return requested, names
 
 
-def _started(
+def _consistent_engine(
     scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, laws: Mapping[str, Pieces] = NO_LAWS
 ) -> tuple[Engine, np.ndarray]:
     """Return an engine and its consistent start."""
@@ -118,11 +120,11 @@ def _with_drives(scene: Scene, requested: Mapping[str, PathDrive], names: list[s
             if name in others or name in made or name in scene.load:
                 raise InputError(where, f"the name '{name}' is already in use", "name each actuator once")
             joint, _, _ = _coordinate(scene, name, where)
-            made[name] = JointDrive(joint=joint, coordinate=_named(name), law=Constant(type="constant"))
+            made[name] = JointDrive(joint=joint, coordinate=_coordinate_name(name), law=Constant(type="constant"))
     return scene.model_copy(update={"drive": {**others, **made}})
 
 
-def _named(actuator: str) -> str | None:
+def _coordinate_name(actuator: str) -> str | None:
     """Return the coordinate in an actuator's name, if any."""
     return actuator.partition(".")[2] or None
 
@@ -217,28 +219,28 @@ def _unit_wrench(sites: np.ndarray, a: int, b: int, coordinate: Coordinate) -> n
     return np.concatenate([np.cross(sites["origin"][b], along), along])
 
 
-def _shared(
+def _with_actuators_as_loads(
     scene: Scene, laws: dict[str, Pieces], names: list[str], bundles: Mapping[str, Labelled], progress: Progress
 ) -> tuple[Scene, dict[str, Pieces]]:
     """Return the scene in which the actuators without a law act as loads, and the laws of all actuators.
 
     laws: of the actuators that produce the scene's motion alone.
     """
-    engine, start = _started(scene, bundles, progress, laws)
+    engine, start = _consistent_engine(scene, bundles, progress, laws)
     trajectory, *sides = _run(engine, start, progress)
-    before, after = (_least(engine, scene, trajectory.time, seen, names, list(laws)) for seen in sides)
+    before, after = (_least_forces(engine, scene, trajectory.time, seen, names, list(laws)) for seen in sides)
     loads, shared = {}, dict(laws)
     for k, name in enumerate(names):
         if name in laws:
             continue
         force = Constant(type="constant")
         joint, _, _ = _coordinate(scene, name)
-        loads[name] = JointForce(type="joint-force", joint=joint, coordinate=_named(name), force=force)
+        loads[name] = JointForce(type="joint-force", joint=joint, coordinate=_coordinate_name(name), force=force)
         shared[f"load.{name}"] = _linear(trajectory.time, before[:, k], after[:, k])
     return scene.model_copy(update={"load": {**scene.load, **loads}}), shared
 
 
-def _least(
+def _least_forces(
     engine: Engine, scene: Scene, time: np.ndarray, seen: Observed, names: list[str], alone: list[str]
 ) -> np.ndarray:
     """Return the least forces of all actuators, (times, actuators); alone: those that produce the motion alone."""

@@ -35,7 +35,7 @@ DIVERGED = 3e6
 LONG_STEPS, LONG_PER_RTOL = 2e-2, 50.0
 
 
-def _of_effects(model: Model) -> list[tuple[int, Losses]]:
+def _losses_of_effects(model: Model) -> list[tuple[int, Losses]]:
     """Return the index in the ledger of each effect's losses."""
     losing = [effect.name for effect in model.parts.present if effect.name in LOSSES]
     return [(model.arrays.size(m.SIZES[f"{name}_slot"]), LOSSES[name](model)) for name in losing]
@@ -69,7 +69,7 @@ def series(model: Model, seen: Observed, component: int | None = None) -> Variab
         load_work, load_loss = (ledger[:, books["load"] + k].sum(axis=1) for k in range(2))
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
-    for slot, (variable, dimension, sites, _) in _of_effects(model):
+    for slot, (variable, dimension, sites, _) in _losses_of_effects(model):
         values = ledger[:, slot : slot + len(sites)]
         lost_there = total(values, sites)
         dissipated, balance = dissipated + lost_there, balance + lost_there
@@ -94,7 +94,7 @@ def series(model: Model, seen: Observed, component: int | None = None) -> Variab
     return variables
 
 
-def usual(solver: Solver) -> float:
+def default_energy_error(solver: Solver) -> float:
     """Return the default energy error above which a run is refused, as a fraction of the exchanged energy."""
     if solver.step is not None:
         return FIXED
@@ -191,7 +191,7 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchang
 
 def _require(model: Model, trajectory: Trajectory, result: Balance, exchanged: float) -> None:
     solver = model.scene.solver
-    tolerance = solver.ledger_tolerance or usual(solver)
+    tolerance = solver.ledger_tolerance or default_energy_error(solver)
     allowed = tolerance * max(result.exchanged, exchanged) + result.rounding
     if result.error[result.worst] <= allowed:
         return
@@ -234,7 +234,7 @@ def _losses(model: Model, totals: dict[str, np.ndarray], t: int) -> str:
             parts.append(f"{totals[f'contact_{cause}_loss'][t, c]:.3g} J to the {cause} of {contact.words}")
     if "modal_damping_loss" in totals:
         parts.append(f"{totals['modal_damping_loss'][t]:.3g} J to modal damping")
-    for _, (variable, *_, words) in _of_effects(model):
+    for _, (variable, *_, words) in _losses_of_effects(model):
         parts += [f"{totals[variable][t, k]:.3g} J to {what}" for k, what in enumerate(words)]
     if "load_loss" in totals:
         parts.append(f"{totals['load_loss'][t]:.3g} J to the loads")

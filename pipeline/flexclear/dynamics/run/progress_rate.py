@@ -89,7 +89,7 @@ def pace(looks: Sequence[Look], patience: float) -> float:
     return late if now.evaluations - first.evaluations > patience else min(average, late)
 
 
-def limited(looks: Sequence[Look]) -> bool:
+def limited_by_stability(looks: Sequence[Look]) -> bool:
     """Return True when recently stability, not accuracy, limited the method's steps."""
     before, now = half(looks), looks[-1]
     return now.stiff - before.stiff > refusal.STIFF_SHARE * (now.steps - before.steps)
@@ -98,7 +98,12 @@ def limited(looks: Sequence[Look]) -> bool:
 def crawls(engine: Engine, looks: Sequence[Look]) -> str:
     """Return the reason why a run whose steps stability limits would take far too long; else nothing."""
     n, control, now = engine.n, engine.control, looks[-1]
-    if not engine.method.traits.hands_over_to or control[m.FIXED] or now.evaluations < TRIAL or not limited(looks):
+    if (
+        not engine.method.traits.hands_over_to
+        or control[m.FIXED]
+        or now.evaluations < TRIAL
+        or not limited_by_stability(looks)
+    ):
         return ""
     whole = now.evaluations + pace(looks, TRIAL) * (engine.end - now.time)
     return refusal.stiffness(n, control) if whole > min(HOPELESS, n[m.CAP]) else ""
@@ -114,7 +119,7 @@ def affordable(scene: Scene) -> Judges | None:
     return Judges({DEFAULT: (Judge(None, _dear), STIFF)}, {}, TRIAL)
 
 
-def unverified(scene: Scene) -> Scene:
+def scene_without_comparison(scene: Scene) -> Scene:
     """Return the scene of an expensive run without comparison, of a member or point, by method and tolerance of these.
 
     A tolerance that the scene gives stays.

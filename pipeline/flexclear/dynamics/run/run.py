@@ -26,7 +26,7 @@ from flexclear.dynamics.run.horizon.horizon import Pair
 from flexclear.dynamics.run.ledger import require_closed
 from flexclear.dynamics.run.progress_rate import Judges, Panel
 from flexclear.dynamics.run.singular_poses import collocation
-from flexclear.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, asked, never
+from flexclear.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never, stop_requested
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.load import edited
 from flexclear.scene.schema import Scene
@@ -70,13 +70,13 @@ class Run:
 
     @cached_property
     def judged(self) -> tuple[Trajectory, Observed]:
-        """The rows by which the run is judged (`judged`)."""
-        return judged(self.engine, self.trajectory, self.observed)
+        """The rows by which the run is judged (`rows_to_judge`)."""
+        return rows_to_judge(self.engine, self.trajectory, self.observed)
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Engine:
     """Return the compiled engine of a scene at the begin of its run; paths are not solved for."""
-    return prepare(tabulate(build(begun(scene, bundles, progress)[0], bundles)), progress)
+    return prepare(tabulate(build(with_start_state(scene, bundles, progress)[0], bundles)), progress)
 
 
 def placed(scene: Scene) -> Scene:
@@ -88,7 +88,9 @@ def placed(scene: Scene) -> Scene:
     return STARTS[scene.start.begins].placed(scene)
 
 
-def driven(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
+def with_driven_actuators(
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress
+) -> tuple[Scene, Mapping[str, Pieces]]:
     """Return the scene whose actuators are driven so that they produce the given paths, and the actuators' laws."""
     if not any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
         return scene, {}
@@ -97,7 +99,7 @@ def driven(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) ->
     return actuated(scene, bundles, progress)
 
 
-def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
+def with_start_state(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
     """Return the scene with the poses and velocities of its `[start]`.
 
     Return also which of several assemblies was chosen, in words; empty when there is one, or the scene chooses.
@@ -119,8 +121,8 @@ def engines(
 
 def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[..., Engine]:
     """Return a function that makes the engine of a run for an integrator's name, by default the scene's."""
-    posed, choice = begun(scene, bundles, progress)
-    moved, given = driven(posed, bundles, progress)
+    posed, choice = with_start_state(scene, bundles, progress)
+    moved, given = with_driven_actuators(posed, bundles, progress)
     making = Lock()  # a run and its perturbed run may both continue with another integrator
 
     def made(name: str = "", tell: Progress = progress) -> Engine:
@@ -189,13 +191,15 @@ class RunInParts:
 
     def _stop(self, rows: np.ndarray) -> bool:
         """Return True where the steps pause; the pair is given the rows so far."""
-        return (asked if self._pair is None else self._pair.store_rows)(rows) or bool(rows[-1, 0] >= self._until)
+        return (stop_requested if self._pair is None else self._pair.store_rows)(rows) or bool(
+            rows[-1, 0] >= self._until
+        )
 
     def _observed(self, last: Engine, trajectory: Trajectory, switched: str) -> Run:
         over = bool(last.control[m.TIME] >= last.end)
         engine = last if over else another(last)  # observation would disturb an engine that goes on
         shown = trajectory if self._pair is None else trajectory.without(self._pair.added)
-        run = Run(self._scene, engine, shown, observed(engine, shown), None, switched, self._mended)
+        run = Run(self._scene, engine, shown, observe_run(engine, shown), None, switched, self._mended)
         if not over and stopping.requested():
             return replace(run, stopped=stopping.requested())
         require_shallow(run.model, run.trajectory, run.observed)
@@ -285,12 +289,12 @@ def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> Non
         refuse_deep(contact.words, contact.joint, float(depth))
 
 
-def observed(engine: Engine, trajectory: Trajectory) -> Observed:
+def observe_run(engine: Engine, trajectory: Trajectory) -> Observed:
     """Return the observed rows of a trajectory, each with the closure rows selected at its time.
 
     Raises SolverError when a row could not be evaluated.
     """
-    seen = _evaluated(engine, trajectory)
+    seen = _evaluate_rows(engine, trajectory)
     bad = np.flatnonzero(seen.status)
     if len(bad):
         at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
@@ -305,7 +309,7 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     return seen
 
 
-def judged(engine: Engine, trajectory: Trajectory, seen: Observed) -> tuple[Trajectory, Observed]:
+def rows_to_judge(engine: Engine, trajectory: Trajectory, seen: Observed) -> tuple[Trajectory, Observed]:
     """Return the recorded rows with those between them, by time, and the outputs JUDGED there.
 
     seen: outputs of the recorded rows, of which the others are returned as they are.  Energies, speeds and deformations
@@ -314,7 +318,7 @@ def judged(engine: Engine, trajectory: Trajectory, seen: Observed) -> tuple[Traj
     inner = replace(trajectory, rows=trajectory.between)
     if not len(inner.rows):
         return trajectory, seen
-    there = _evaluated(engine, inner)
+    there = _evaluate_rows(engine, inner)
     fine = np.flatnonzero(there.status == m.OK)  # without those next to a singular pose
     rows = np.concatenate([trajectory.rows, inner.rows[fine]])
     order = np.argsort(rows[:, 0], kind="stable")
@@ -322,8 +326,8 @@ def judged(engine: Engine, trajectory: Trajectory, seen: Observed) -> tuple[Traj
     return replace(trajectory, rows=rows[order]), replace(seen, **both)
 
 
-def _evaluated(engine: Engine, trajectory: Trajectory) -> Observed:
-    """Return the rows of a trajectory as `observed` does, those that could not be evaluated as well."""
+def _evaluate_rows(engine: Engine, trajectory: Trajectory) -> Observed:
+    """Return the rows of a trajectory as `observe_run` does, those that could not be evaluated as well."""
     parts = list[Blocks]()
     for part, selected in trajectory.parts():
         engine.keep(selected)

@@ -16,7 +16,7 @@ from flexclear.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.dynamics.run.controllers import sampler
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.start import NO_IMPACT, overlapping
+from flexclear.dynamics.run.evaluation.start import NO_IMPACT, overlap_depths
 from flexclear.dynamics.run.pieces import Handover, Jumps, Moment, Selections, Tape, by_time
 from flexclear.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.dynamics.run.refusals import refusal
@@ -51,7 +51,7 @@ def never(rows: np.ndarray) -> bool:
     return False
 
 
-def asked(rows: np.ndarray) -> bool:
+def stop_requested(rows: np.ndarray) -> bool:
     """Return True on a request to stop: the run ends with its rows so far."""
     return bool(stopping.requested())
 
@@ -294,7 +294,7 @@ def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
     """Begin the contacts that are closed at the start, at the approach speeds that the scene declares."""
     n, watched, event = engine.n, engine.table(m.WATCH), m.named(m.EVENT, events)[:, 0]
     engine.view(m.WATCH.at)[:] = 0.0
-    for c in overlapping(engine, y):
+    for c in overlap_depths(engine, y):
         speed = engine.model.contacts[c].joint.initial_approach_speed
         if speed is None:
             continue  # a start that differs by a hair from one that touches: it closes at once
@@ -334,10 +334,10 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
             if closure_rows.improve(engine, t):
                 tape.selections.append((t, engine.selected.copy()))
-            elif status != m.WORN_ROWS and not _rescued(engine, tape):
+            elif status != m.WORN_ROWS and not _rescue(engine, tape):
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
         elif status != m.PAUSED:
-            if not _rescued(engine, tape):
+            if not _rescue(engine, tape):
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
         else:
             if engine.model.contacts:
@@ -382,7 +382,7 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     return made is not None
 
 
-def _rescued(engine: Engine, tape: Tape) -> bool:
+def _rescue(engine: Engine, tape: Tape) -> bool:
     """Return True when a stepper that stopped gets a polynomial: a singular pose ahead may be the cause."""
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:

@@ -20,7 +20,7 @@ from flexclear.dynamics.run.horizon.tangents import Differentiated, differentiat
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.sensitivity.parameters import Family
 from flexclear.dynamics.sensitivity.recipes import Varied
-from flexclear.dynamics.sensitivity.series import NORMAL_FORCE, Series, derivatives, read
+from flexclear.dynamics.sensitivity.series import NORMAL_FORCE, Series, derivatives, read_quantities
 from flexclear.scene.event_kinds import CLOSING
 from flexclear.scene.load import with_numbers
 from flexclear.scene.quantity import KINDS, Quantity, Recorded, parse, parse_recorded
@@ -87,14 +87,14 @@ def sensitivities(
         for term in one.quantity.terms():
             if KINDS[term.kind].owner == "frame":
                 find_frame(engine.model.mechanism.frames, term.owner, f"of: '{one.name}'")
-    family = Family(_near(scene, engine), bundles, engine, varied or {})
+    family = Family(_with_poses_of_run(scene, engine), bundles, engine, varied or {})
     parameters = [family.parameter(path) for path in to]
     directions = [family.direction(parameter) for parameter in parameters]
     start = consistent_start(engine)
     run = differentiate(engine, start, [*(one for one, _ in directions), start_direction(engine, start)], progress)
     grown = growth(engine, run, len(directions))
     series = {one.quantity.name: one.quantity for one in requested if one.quantity.over_time}
-    values = read(family, engine, run, series.values())
+    values = read_quantities(family, engine, run, series.values())
     columns: dict[str, list[np.ndarray]] = {one.name: [] for one in requested}
     for k, parameter in enumerate(parameters):
         progress((k + 1) / len(parameters), f"quantities by {parameter.path}")
@@ -121,7 +121,7 @@ def sensitivities(
     return xr.Dataset(variables, coordinates, facts)
 
 
-def _near(scene: Scene, engine: Engine) -> Scene:
+def _with_poses_of_run(scene: Scene, engine: Engine) -> Scene:
     """Return the scene with the poses of its run, from which equilibria of changed scenes are sought.
 
     From further away each search would end elsewhere along motions that no force resists.
@@ -152,13 +152,13 @@ def _derivative(
         change = np.where(time[:, None] <= horizon, changes[one.quantity.name], np.nan)
         return change if one.quantity.dim else change[:, 0]
     if not one.quantity.over_time:
-        at, value = _of_contact(one, model, run, k, values, changes)
+        at, value = _derivative_of_contact(one, model, run, k, values, changes)
         return np.asarray(value if at <= horizon else np.nan)
     if recorded.reduction == "series":
         raise InputError(f"of: '{one.name}'", "is over time", f"write {one.quantity.name}")
     series, change = values[one.quantity.name], changes[one.quantity.name]
     if recorded.reduction == "largest":
-        at, value = _of_largest(time, series, change)
+        at, value = _derivative_of_largest(time, series, change)
         return np.asarray(value if at <= horizon else np.nan)
     # step for the derivative of reductions, smooth functions of their series, as a fraction of the largest change
     step = 1e-6 * (np.abs(series).max(initial=0.0) or 1.0) / (np.abs(change).max(initial=0.0) or 1.0)
@@ -168,7 +168,7 @@ def _derivative(
     return result if result.ndim == 0 or one.quantity.dim else result[..., 0]
 
 
-def _of_largest(time: np.ndarray, series: np.ndarray, change: np.ndarray) -> tuple[float, float]:
+def _derivative_of_largest(time: np.ndarray, series: np.ndarray, change: np.ndarray) -> tuple[float, float]:
     """Return the time of the largest magnitude, and the derivative of that magnitude.
 
     The maximum of a function of time changes as the function does at the time of the maximum. That time, and the change
@@ -185,7 +185,7 @@ def _of_largest(time: np.ndarray, series: np.ndarray, change: np.ndarray) -> tup
     return float(time[k] + later), float(np.polyval(np.polyfit(time[rows] - time[k], changes[rows], 2), later))
 
 
-def _of_contact(
+def _derivative_of_contact(
     one: Requested, model: Model, run: Differentiated, k: int, values: Series, changes: Series
 ) -> tuple[float, float]:
     """Return the time up to which the motion determines a contact's result, and the derivative of the result."""

@@ -43,7 +43,9 @@ class Varied:
         return replace(arrays, variables={**arrays.variables, **moved})
 
 
-def varied(path: str, body: str, number: tuple[float, str], base: Labelled, around: Mapping[int, Labelled]) -> Varied:
+def vary_number(
+    path: str, body: str, number: tuple[float, str], base: Labelled, around: Mapping[int, Labelled]
+) -> Varied:
     """Return a number of a recipe from bundles at -2, -1, 1 and 2 steps (`RECIPE_STEP`) of it.
 
     Raises InputError where the bundles differ in their variables' shapes, SolverError where they do not change
@@ -56,7 +58,7 @@ def varied(path: str, body: str, number: tuple[float, str], base: Labelled, arou
     turns = {k: _alignment(middle, side) for k, side in sides.items()} if "frequency" in middle else {}
     changes = {}
     for name in names:
-        v = {k: _turned(name, side, turns[k]) if turns else side[name].values for k, side in sides.items()}
+        v = {k: _in_aligned_modes(name, side, turns[k]) if turns else side[name].values for k, side in sides.items()}
         narrow = (v[1] - v[-1]) / (2.0 * RECIPE_STEP)
         change = (v[-2] - 8.0 * v[-1] + 8.0 * v[1] - v[2]) / (12.0 * RECIPE_STEP)
         off, largest, size = (float(np.abs(x).max(initial=0.0)) for x in (narrow - change, change, middle[name].values))
@@ -82,7 +84,7 @@ def _alignment(base: LabelledArrays, other: LabelledArrays) -> np.ndarray:
     return turn
 
 
-def _turned(name: str, bundle: LabelledArrays, turn: np.ndarray) -> np.ndarray:
+def _in_aligned_modes(name: str, bundle: LabelledArrays, turn: np.ndarray) -> np.ndarray:
     """Return a variable of a bundle in aligned modes."""
     array = bundle[name]
     values = array.values

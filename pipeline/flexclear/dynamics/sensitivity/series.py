@@ -17,7 +17,7 @@ from flexclear.dynamics.record.dataset import series
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.horizon.tangents import Differentiated
-from flexclear.dynamics.run.run import observed
+from flexclear.dynamics.run.run import observe_run
 from flexclear.dynamics.sensitivity.parameters import Family, Parameter, central
 from flexclear.scene.quantity import Quantity
 
@@ -30,9 +30,9 @@ NORMAL_FORCE = "normal force"
 Series = dict[str, np.ndarray]
 
 
-def read(family: Family, engine: Engine, run: Differentiated, requested: Collection[Quantity]) -> Series:
+def read_quantities(family: Family, engine: Engine, run: Differentiated, requested: Collection[Quantity]) -> Series:
     """Return quantities over time, (rows, components), by name; and NORMAL_FORCE, (rows, contacts)."""
-    seen = observed(engine, run.trajectory)
+    seen = observe_run(engine, run.trajectory)
     result = series(family.scene, Motions(engine.model, seen), requested, run.trajectory.time)
     return result | {NORMAL_FORCE: seen.touch["normal_force"]}
 
@@ -40,7 +40,7 @@ def read(family: Family, engine: Engine, run: Differentiated, requested: Collect
 def derivatives(
     family: Family, run: Differentiated, k: int, parameter: Parameter, widest: float, requested: Collection[Quantity]
 ) -> Series:
-    """Return the derivatives of the series of `read` along direction k of a run, per unit of the parameter.
+    """Return the derivatives of the series of `read_quantities` along direction k of a run, per unit of the parameter.
 
     widest: step of the parameter at which its start is smooth.
     """
@@ -50,7 +50,9 @@ def derivatives(
     for power in np.unique(powers):
         rows, step = np.flatnonzero(powers == power), 10.0**power
         around = {
-            j: read(family, family.changed(parameter, j * step), moved(run, k, rows, j * step), requested)
+            j: read_quantities(
+                family, family.changed(parameter, j * step), move_rows(run, k, rows, j * step), requested
+            )
             for j in (-2, -1, 1, 2)
         }
         for name in around[1]:
@@ -59,7 +61,7 @@ def derivatives(
     return result
 
 
-def moved(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differentiated:
+def move_rows(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differentiated:
     """Return some rows of a run, moved by a step along direction k."""
     some = run.trajectory.rows[rows]
     record = recording.record(some, run.trajectory.contacts)
@@ -76,8 +78,8 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter, wi
     steps = widest / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
     if model.contacts:
         everything, probe = np.arange(len(steps)), float(steps.min()) * 1e-3
-        sides = [(family.changed(parameter, j * probe), moved(run, k, everything, j * probe)) for j in (-1, 1)]
-        gaps = [observed(engine, side.trajectory).touch["gap"] for engine, side in sides]
+        sides = [(family.changed(parameter, j * probe), move_rows(run, k, everything, j * probe)) for j in (-1, 1)]
+        gaps = [observe_run(engine, side.trajectory).touch["gap"] for engine, side in sides]
         depth, change = -0.5 * (gaps[0] + gaps[1]), np.abs(gaps[1] - gaps[0]) / (2.0 * probe)
         closed = (recording.record(run.trajectory.rows, run.trajectory.contacts).modes == 1) & (depth > 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics.linear.bench import state
-from flexclear.dynamics.linear.equilibrium import balanced
+from flexclear.dynamics.linear.equilibrium import bench_in_equilibrium
 from flexclear.dynamics.model.start_table import given_coordinates
-from flexclear.dynamics.starts.snapshot import held, joint_starts, posed, resting
+from flexclear.dynamics.starts.snapshot import joint_starts, with_held_drives, with_poses, with_resting_contacts
 from flexclear.scene.laws import Constant
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import JointStart, Start
@@ -20,16 +20,16 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
     Raises InputError for a scene that cannot be built, SolverError without an equilibrium close to its poses.
     """
-    bench, rest, _ = balanced(placed(scene), bundles, progress)
+    bench, rest, _ = bench_in_equilibrium(placed(scene), bundles, progress)
     progress(None, f"starts at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
-    rest_state = posed(scene, bench.engine, state(bench, rest.at.q), bench.time)
-    return resting(rest_state, scene.contacts(), scene.stop), bench.engine.model.mechanism.choice
+    rest_state = with_poses(scene, bench.engine, state(bench, rest.at.q), bench.time)
+    return with_resting_contacts(rest_state, scene.contacts(), scene.stop), bench.engine.model.mechanism.choice
 
 
 def placed(scene: Scene) -> Scene:
     """Return the scene with given joint positions held by drives; of its start only position hints remain."""
     assert scene.start is not None
-    holds = held(scene, given_coordinates(scene), lambda _, value: Constant(type="constant", value=value))
+    holds = with_held_drives(scene, given_coordinates(scene), lambda _, value: Constant(type="constant", value=value))
 
     def hint(one: JointStart) -> JointStart | None:
         given = one.position is not None or one.near is not None

@@ -25,12 +25,12 @@ from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start, per_speed, project
 from flexclear.dynamics.run.run import maker
-from flexclear.dynamics.starts.snapshot import held, moving, resting
+from flexclear.dynamics.starts.snapshot import with_held_drives, with_poses_and_velocities, with_resting_contacts
 from flexclear.scene.laws import Polynomial
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import Start
-from flexclear.scene.variants import loose
+from flexclear.scene.variants import replaceable_contacts
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress
 
@@ -47,13 +47,13 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     their pressed positions.
     """
     ideal_scene, t = placed(scene), scene.time.start
-    engine, y = _started(ideal_scene, bundles, progress)
+    engine, y = _start_ideal(ideal_scene, bundles, progress)
     y = _deform_statically(engine, y)
     forces = _forces(scene, engine, y)
-    concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
-    if not loose(scene):
+    concentric, choice = with_poses_and_velocities(scene, engine, y, t), engine.model.mechanism.choice
+    if not replaceable_contacts(scene):
         return concentric, choice
-    exact = concentric.model_copy(update={"drive": _exact_drives(ideal_scene, loose(scene), engine, y)})
+    exact = concentric.model_copy(update={"drive": _exact_drives(ideal_scene, replaceable_contacts(scene), engine, y)})
     try:
         engine, y = _pressed(exact, bundles, progress, forces)
     except (InputError, SolverError):
@@ -61,7 +61,9 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
             raise
         choice = f"{choice}\nthe pins are not pressed into their sockets without moving given joint positions".strip()
         engine, y = _pressed(concentric, bundles, progress, forces)
-    return resting(moving(concentric, engine, y, t), loose(scene), {}), choice
+    return with_resting_contacts(
+        with_poses_and_velocities(concentric, engine, y, t), replaceable_contacts(scene), {}
+    ), choice
 
 
 def _exact_drives(scene: Scene, pins: Container[str], engine: Engine, y: np.ndarray) -> dict[str, Any]:
@@ -75,13 +77,13 @@ def _exact_drives(scene: Scene, pins: Container[str], engine: Engine, y: np.ndar
         name = label(start.joint, scene.joint[start.joint].type, start.number)
         return Polynomial(type="polynomial", coefficients=(value, float(rates[name][1][0])), origin=engine.start)
 
-    return held(scene, [start for start in given_coordinates(scene) if start.joint not in pins], law)
+    return with_held_drives(scene, [start for start in given_coordinates(scene) if start.joint not in pins], law)
 
 
 def _pressed(
     scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, forces: Mapping[str, np.ndarray]
 ) -> tuple[Engine, np.ndarray]:
-    engine, y = _started(scene, bundles, progress)
+    engine, y = _start_ideal(scene, bundles, progress)
     return engine, _press_pins(engine, y, forces)
 
 
@@ -89,13 +91,13 @@ def placed(scene: Scene) -> Scene:
     """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart."""
     joints = scene.joint | {
         name: IdealJoint.model_validate({"type": joint.ideal, "between": joint.between})
-        for name, joint in loose(scene).items()
+        for name, joint in replaceable_contacts(scene).items()
     }
     start = (scene.start or Start()).model_copy(update={"at": None})
     return scene.model_copy(update={"joint": joints, "start": start})
 
 
-def _started(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Engine, np.ndarray]:
+def _start_ideal(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Engine, np.ndarray]:
     engine = maker(scene, bundles, progress)()
     return engine, consistent_start(engine)
 
@@ -116,12 +118,15 @@ def _deform_statically(engine: Engine, y: np.ndarray) -> np.ndarray:
         for _ in range(10):
             rates = _accelerations(engine, state, speeds)
             slopes = np.array(
-                [_accelerations(engine, _changed(engine, state, step * unit), speeds) for unit in np.eye(len(speeds))]
+                [
+                    _accelerations(engine, _with_modal_change(engine, state, step * unit), speeds)
+                    for unit in np.eye(len(speeds))
+                ]
             )
             slopes = (slopes - rates).T / step
             stiffness = np.maximum(np.abs(np.diag(slopes)), np.finfo(float).tiny)
             change = np.linalg.lstsq(slopes / stiffness[:, None], -rates / stiffness, rcond=SINGULAR_ROUNDING)[0]
-            state = _changed(engine, state, change)
+            state = _with_modal_change(engine, state, change)
             if np.max(np.abs(change)) <= 1e-9 * np.max(np.abs(state[_modes(engine)])):
                 return state
     except SolverError:
@@ -129,7 +134,7 @@ def _deform_statically(engine: Engine, y: np.ndarray) -> np.ndarray:
     return y
 
 
-def _changed(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
+def _with_modal_change(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Return the state with changed modal coordinates and closed loops."""
     changed = y.copy()
     changed[_modes(engine)] += change
@@ -159,7 +164,11 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
     model, table = engine.model, engine.model.arrays.table(m.CONTACTS)
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
     # the end of a stop may move, too: held fixed, it would hold the pins back
-    pins = [pin for pin in zip(table, model.contacts, model.laws, strict=True) if pin[1].name in loose(model.scene)]
+    pins = [
+        pin
+        for pin in zip(table, model.contacts, model.laws, strict=True)
+        if pin[1].name in replaceable_contacts(model.scene)
+    ]
     modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, _ in pins)
 
     def along(row: np.void, joint: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -27,7 +27,7 @@ from flexclear.scene.units import LARGEST_NUMBER
 Vector = tuple[float, float, float]
 
 
-def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
+def with_poses(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
     """Return the scene with every body's pose and deformation of state y at time t.
 
     Velocities are those of the scene.  Its joint positions and its place to begin are left out.
@@ -52,9 +52,9 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
     return scene.model_copy(update={"body": bodies, "start": _start_without_poses(scene, modal)})
 
 
-def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
-    """Return the scene as `posed` does, with the velocities of the state as well."""
-    still, model = posed(scene, engine, y, t), engine.model
+def with_poses_and_velocities(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
+    """Return the scene as `with_poses` does, with the velocities of the state as well."""
+    still, model = with_poses(scene, engine, y, t), engine.model
     frames, q, u, bodies = engine.table(m.LINK_FRAMES), y[: model.nq], y[model.speeds], dict(still.body)
     for name, body in still.body.items():
         if not isinstance(body, Ground):
@@ -68,7 +68,7 @@ def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
     return still.model_copy(update={"body": bodies, "start": start})
 
 
-def resting(scene: Scene, contacts: Mapping[str, Clearance], stops: Mapping[str, Stop]) -> Scene:
+def with_resting_contacts(scene: Scene, contacts: Mapping[str, Clearance], stops: Mapping[str, Stop]) -> Scene:
     """Return the scene with those of these contacts and stops at rest that are closed at the start."""
 
     def at_rest(parts: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,7 +95,9 @@ def _start_without_poses(scene: Scene, modal: dict[str, ModalStart]) -> Start:
     return old.model_copy(update={"at": None, "run": None, "recorded": {}, "joint": rates, "modal": modal})
 
 
-def held(scene: Scene, starts: Iterable[Given], law: Callable[[Given, float], Constant | Polynomial]) -> dict[str, Any]:
+def with_held_drives(
+    scene: Scene, starts: Iterable[Given], law: Callable[[Given, float], Constant | Polynomial]
+) -> dict[str, Any]:
     """Return the scene's drives, and drives of those coordinates whose given position nothing else drives."""
     driven, drives = joint_drives(scene), dict[str, Any](scene.drive)
     for start in starts:

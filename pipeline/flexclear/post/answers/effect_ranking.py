@@ -26,7 +26,7 @@ from flexclear.artifacts.effect_size import (
 )
 from flexclear.artifacts.points import Point
 from flexclear.post.answers.effect_sizes import MEANING_NOT_COMPARABLE, NOT_COMPARABLE, cell, listed, written
-from flexclear.post.overview.curves import in_unit, rounded, size_of
+from flexclear.post.overview.curves import format_to_digits, in_unit, size_of
 from flexclear.post.plotting.table import Table
 from flexclear.scene.quantity import Quantity
 
@@ -159,7 +159,7 @@ def in_words(
     """
 
     def percent(value: float) -> str:
-        return f" ({rounded(100.0 * value / scale, 2)} % of its {size_of(unit)} in {of})"
+        return f" ({format_to_digits(100.0 * value / scale, 2)} % of its {size_of(unit)} in {of})"
 
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree within <b class='n'>{in_unit(change.most, unit)}</b>"

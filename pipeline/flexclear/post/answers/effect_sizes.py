@@ -13,7 +13,7 @@ import xarray as xr
 
 from flexclear.artifacts.effect_size import Influence, change, early_changes, influence
 from flexclear.artifacts.points import Point
-from flexclear.post.overview.curves import in_unit, measured
+from flexclear.post.overview.curves import format_with_error, in_unit
 from flexclear.post.plotting.table import Table
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import Effect
@@ -199,7 +199,7 @@ def written(value: float, uncertainty: float, unit: str) -> str:
         return NOT_COMPARABLE
     if value == 0.0 < uncertainty:
         return f"< {in_unit(uncertainty, unit, 2)}"
-    return measured(value, uncertainty, unit) if uncertainty > 0.0 else in_unit(value, unit, 3)
+    return format_with_error(value, uncertainty, unit) if uncertainty > 0.0 else in_unit(value, unit, 3)
 
 
 def listed(names: Sequence[str]) -> str:
@@ -264,7 +264,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="requested accuracy")
             low, high = panel.get_xlim()
             if high < FEW * low:
-                style.plain(panel.xaxis)
+                style.set_plain_numbers(panel.xaxis)
             else:
                 panel.xaxis.set_minor_formatter(NullFormatter())
             panel.set_yticks(np.arange(len(names)), names, fontsize=7.6)

@@ -18,7 +18,7 @@ from flexclear.post.overview.curves import impacts, in_unit
 from flexclear.post.single_run.series import parameters, sentence
 from flexclear.scene.clearance import SURFACES
 from flexclear.scene.quantity import Quantity
-from flexclear.scene.variants import staying
+from flexclear.scene.variants import contacts_that_stay
 
 NEITHER = "The scene has neither clearance nor flexible bodies"
 
@@ -46,7 +46,9 @@ def answer(
         many = "one warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
         sentences.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
     head = "Compared with the same mechanism with ideal joints and rigid bodies"
-    keeps = [] if run is None else staying({n: j["type"] for n, j in parameters(run).get("joint", {}).items()})
+    keeps = (
+        [] if run is None else contacts_that_stay({n: j["type"] for n, j in parameters(run).get("joint", {}).items()})
+    )
     head += "; after ±, what may be due to chance" if any("±" in text for text in changes) else ""
     head += f" ({html.escape(stay(keeps)).rstrip('.')}):" if keeps else ":"
     return f"{'' if compared is None else f'<p>{head}</p>'}<ul>{''.join(f'<li>{text}</li>' for text in sentences)}</ul>"

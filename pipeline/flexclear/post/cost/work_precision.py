@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flexclear.post.cost.study import MARGIN, methods, recording, resolved
-from flexclear.post.plotting.style import GRID, INK, SOFT, files, heading, panels, plain, scale_of, style
+from flexclear.post.plotting.style import GRID, INK, SOFT, files, heading, panels, scale_of, set_plain_numbers, style
 from flexclear.scene.integrators import INTEGRATORS
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
@@ -121,7 +121,7 @@ def _panel(
                 m.name, (m.seconds, m.error[name]), xytext=(shift, 4), textcoords="offset points", fontsize=6.8, ha=side
             )
     ax.set(xscale="log", yscale=scale_of(ax), title=name)
-    plain(ax.xaxis)
+    set_plain_numbers(ax.xaxis)
     if np.isinf(bound):
         text = "cannot be determined: reference and confirmation\ndiffer in their number of impacts"
         ax.set(yscale="linear", yticks=[])  # no errors to scale

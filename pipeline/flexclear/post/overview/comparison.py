@@ -16,7 +16,7 @@ import xarray as xr
 
 from flexclear.artifacts import quantities
 from flexclear.artifacts.schema import require_complete
-from flexclear.post.overview.curves import NOISE, Curve, curves, in_unit, scaled
+from flexclear.post.overview.curves import NOISE, Curve, curves, in_unit, readable_unit
 from flexclear.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.post.plotting import style
 from flexclear.post.plotting.table import Table
@@ -42,7 +42,7 @@ def assemble(
     for label, run in runs.items():
         require_complete(run, label)
     labels = list(runs)
-    time = _common(runs)
+    time = _common_times(runs)
     shape = (len(labels), len(chosen))
     numbers = {name: np.full(shape, np.nan) for name in ("largest", "error", "difference")}
     series = {name: np.full((*shape, time.size), np.nan) for name in ("value", "distance")}
@@ -52,7 +52,7 @@ def assemble(
         for i, (label, run) in enumerate(runs.items()):
             curve = drawn[i]
             if curve is not None:
-                series["value"][i, j] = curve.values[_at(curve.time, time)]
+                series["value"][i, j] = curve.values[_indices_at(curve.time, time)]
             if not quantities.has(run, quantity):
                 continue
             numbers["largest"][i, j] = quantities.scale(run, quantity)
@@ -62,7 +62,7 @@ def assemble(
                 numbers["difference"][i, j] = _difference_of(run, reference, quantity)
                 if quantity.over_time:
                     when, distance = quantities.deviation(run, reference, quantity)
-                    series["distance"][i, j] = distance[_at(when, time)]
+                    series["distance"][i, j] = distance[_indices_at(when, time)]
     data: dict[str, tuple[tuple[str, ...], np.ndarray]]
     data = {name: (("run", "quantity"), values) for name, values in numbers.items()}
     data |= {name: (("run", "quantity", "time"), values) for name, values in series.items()}
@@ -96,7 +96,7 @@ def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -
     return max(difference, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
 
 
-def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
+def _common_times(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
     def both(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return a[quantities.common_times(a, b)[0]]
 
@@ -110,7 +110,7 @@ def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
     return time
 
 
-def _at(own: np.ndarray, requested: np.ndarray) -> np.ndarray:
+def _indices_at(own: np.ndarray, requested: np.ndarray) -> np.ndarray:
     """Return indices of the common times among a run's own."""
     return quantities.common_times(own, requested)[0]
 
@@ -155,7 +155,7 @@ def table(compared: xr.Dataset) -> Table:
                 continue
             error = float(part["error"])
             against = "reference" if i == 0 else _difference(compared, i, j, unit)
-            rows.append((str(name), label, in_unit(float(part["largest"]), unit), _own(error, unit), against))
+            rows.append((str(name), label, in_unit(float(part["largest"]), unit), _error_text(error, unit), against))
     notes = [
         "Own error: the largest difference between this run and the same run at a ten times tighter tolerance "
         "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "
@@ -179,8 +179,8 @@ def costs(compared: xr.Dataset) -> Table:
     rows = []
     for i, label in enumerate(compared["run"].values):
         part = compared.isel(run=i)
-        cells = [_whole(float(part[name])) for name in COSTS]
-        cells += [_whole(float(value)) for value in part["impact_count"].values]
+        cells = [_count_text(float(part[name])) for name in COSTS]
+        cells += [_count_text(float(value)) for value in part["impact_count"].values]
         cells += [
             "–" if np.isnan(value) else in_unit(float(value), str(unit))
             for value, unit in zip(part["peak_force"].values, part["peak_force_unit"].values, strict=True)
@@ -198,13 +198,13 @@ def _difference(compared: xr.Dataset, run: int, quantity: int, unit: str) -> str
     return in_unit(value, unit)
 
 
-def _own(error: float, unit: str) -> str:
+def _error_text(error: float, unit: str) -> str:
     if np.isnan(error):
         return "–"
     return "other number of impacts" if np.isinf(error) else in_unit(error, unit, 2)
 
 
-def _whole(value: float) -> str:
+def _count_text(value: float) -> str:
     return "–" if np.isnan(value) else f"{value:,.0f}"
 
 
@@ -261,7 +261,7 @@ def _panels(runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[
 
 def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], lines: Sequence[Curve | None]) -> None:
     drawn = [curve for curve in lines if curve is not None]
-    factor, unit = scaled(max(float(np.abs(curve.values).max(initial=0.0)) for curve in drawn), drawn[0].unit)
+    factor, unit = readable_unit(max(float(np.abs(curve.values).max(initial=0.0)) for curve in drawn), drawn[0].unit)
     own = colors(runs)
     for k, ((label, run), curve) in enumerate(zip(runs.items(), lines, strict=True)):
         if curve is None:
@@ -298,7 +298,7 @@ def _distance(
     unit = next(curve.unit for curve in curves_drawn if curve is not None)
     size = max(float(np.abs(curve.values).max(initial=0.0)) for curve in curves_drawn if curve is not None)
     lines = [(k, time, np.where(values.max(initial=0.0) > NOISE * size, values, 0.0)) for k, time, values in lines]
-    factor, written = scaled(max(float(values.max(initial=0.0)) for _, _, values in lines), unit)
+    factor, written = readable_unit(max(float(values.max(initial=0.0)) for _, _, values in lines), unit)
     own = colors(runs)
     for k, time, values in lines:
         axes.plot(1e3 * time, factor * values, color=own[k], lw=0.9)

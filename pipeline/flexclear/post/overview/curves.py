@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.artifacts import quantities
-from flexclear.numerics.rotations import Turning, first_largest, turning
+from flexclear.numerics.rotations import Turning, first_largest, rotation_since_start
 from flexclear.scene.quantity import KINDS, Quantity
 
 #: factors and units for smaller and larger values, largest first
@@ -43,7 +43,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
     if not quantity.over_time:
         return [_force(run, quantity.owner) for run in runs]
     if quantity.kind == "orientation":
-        return [_turned(run, quantity) if quantities.has(run, quantity) else None for run in runs]
+        return [_rotation_curve(run, quantity) if quantities.has(run, quantity) else None for run in runs]
     lines = [quantities.series(run, quantity) if quantities.has(run, quantity) else None for run in runs]
     present = [values for values in lines if values is not None]
     k, title = 0, _title(runs, quantity)
@@ -57,7 +57,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
             title,
             quantities.unit(run, quantity),
             run["time"].values,
-            without_noise(_drawn(values, quantity, k), _noise(run, quantity)),
+            without_noise(_component_values(values, quantity, k), _noise(run, quantity)),
             NONE,
         )
         for run, values in zip(runs, lines, strict=True)
@@ -69,7 +69,7 @@ NONE = np.empty((0, 2))
 SHORT = 4.0
 
 
-def _turned(run: xr.Dataset, quantity: Quantity) -> Curve:
+def _rotation_curve(run: xr.Dataset, quantity: Quantity) -> Curve:
     turned = turned_by(run, quantity.owner)
     return Curve(f"{quantity.owner}: {turned.title}", quantity.unit, run["time"].values, turned.angle, NONE)
 
@@ -77,7 +77,7 @@ def _turned(run: xr.Dataset, quantity: Quantity) -> Curve:
 def turned_by(run: xr.Dataset, body: str) -> Turning:
     """Return the rotation of a body of a run since the start."""
     mine = run.sel(body=body)
-    return turning(run["time"].values, mine["quaternion"].values, mine["angular_velocity"].values)
+    return rotation_since_start(run["time"].values, mine["quaternion"].values, mine["angular_velocity"].values)
 
 
 def _by_component(quantity: Quantity) -> bool:
@@ -95,7 +95,7 @@ def _title(runs: Sequence[xr.Dataset], quantity: Quantity) -> str:
     return f"{quantity.owner}: {words}{f' along {c}' if (c := quantity.component) else ''}"
 
 
-def _drawn(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray:
+def _component_values(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray:
     if _by_component(quantity):
         return values[:, component]
     return values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
@@ -128,7 +128,7 @@ def _peaks(run: xr.Dataset, contact: str) -> np.ndarray:
     return np.column_stack([middle[mine], run["event_peak_force"].values[mine]])
 
 
-def scaled(largest: float, unit: str) -> tuple[float, str]:
+def readable_unit(largest: float, unit: str) -> tuple[float, str]:
     """Return factor and unit in which values up to `largest` [SI] have digits before the point."""
     choices = PREFIXES.get(unit, ((1.0, unit),))
     good = [pair for pair in choices if pair[0] * largest >= 1.0 - 1e-9]  # rounding may put a bar of 1 mm below 1
@@ -140,7 +140,7 @@ def size_of(unit: str) -> str:
     return {"m": "largest change", "rad": "largest change", "s": "last impact's time"}.get(unit, "largest value")
 
 
-def rounded(value: float, digits: int) -> str:
+def format_to_digits(value: float, digits: int) -> str:
     """Format a number to so many significant digits; without exponent up to seven digits before the point."""
     written = float(f"{value:.{digits}g}")
     return f"{written:.0f}" if 10.0**digits <= abs(written) < 1e7 else f"{value:.{digits}g}"
@@ -148,22 +148,22 @@ def rounded(value: float, digits: int) -> str:
 
 def in_unit(value: float, unit: str, digits: int = 4) -> str:
     """Format a value [SI] in a readable unit, to so many significant digits."""
-    factor, written = scaled(value, unit)
-    return f"{rounded(factor * value, digits)} {written}"
+    factor, written = readable_unit(value, unit)
+    return f"{format_to_digits(factor * value, digits)} {written}"
 
 
-def measured(value: float, error: float, unit: str) -> str:
+def format_with_error(value: float, error: float, unit: str) -> str:
     """Format a value [SI] with its error, in a readable unit, to the second digit of the error.
 
     An error that is not known, or below the value's fourth digit, is left out.
     """
     if not np.isfinite(error) or error <= 1e-4 * abs(value):
         return in_unit(value, unit)
-    factor, written = scaled(max(value, error), unit)
+    factor, written = readable_unit(max(value, error), unit)
     value, error = factor * value, factor * error
     decimals = 1 - int(np.floor(np.log10(error)))
     if decimals > 6:
-        return f"{rounded(value, 4)} ± {rounded(error, 2)} {written}"
+        return f"{format_to_digits(value, 4)} ± {format_to_digits(error, 2)} {written}"
     shown = max(decimals, 0)
     return f"{round(value, decimals):.{shown}f} ± {round(error, decimals):.{shown}f} {written}"
 
@@ -197,5 +197,5 @@ def without_noise(values: np.ndarray, noise: float) -> np.ndarray:
 
 
 def by_unit(values: Mapping[str, np.ndarray], unit: str) -> tuple[float, str]:
-    """Return `scaled` for several series that share an axis."""
-    return scaled(max((float(np.abs(v).max(initial=0.0)) for v in values.values()), default=0.0), unit)
+    """Return `readable_unit` for several series that share an axis."""
+    return readable_unit(max((float(np.abs(v).max(initial=0.0)) for v in values.values()), default=0.0), unit)

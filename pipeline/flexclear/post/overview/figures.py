@@ -54,7 +54,7 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
     post = derive(run) if post is None else post
     first = [term.owner for quantity in watched for term in quantity.terms()]
     with style.style():
-        panels = _motion(run, post, first) | _energy(run) | _watched(run, watched)
+        panels = _motion(run, post, first) | _energy(run) | _watched_figures(run, watched)
         if post.sizes["joint"]:
             panels |= _reactions(run, post, first)
         if "contact" in run.sizes:
@@ -66,13 +66,13 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
     return panels
 
 
-def _chosen(names: Sequence[str], first: Sequence[str], size: np.ndarray, most: int) -> list[int]:
+def _drawn_indices(names: Sequence[str], first: Sequence[str], size: np.ndarray, most: int) -> list[int]:
     """Return indices of the drawn items: the watched ones, then those with the largest `size`."""
     order = sorted(range(len(names)), key=lambda k: (names[k] not in first, -size[k]))
     return order[:most]
 
 
-def _rest(count: int, most: int) -> str:
+def _shown_count_text(count: int, most: int) -> str:
     return f"; {most} of {count} are shown" if count > most else ""
 
 
@@ -112,7 +112,7 @@ def _sheet(
 def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
     names = [str(name) for name in run["body"].values]
     moved, speed = post["displacement"].values, run["velocity"].values
-    chosen = _chosen(names, first, np.abs(moved).max(axis=(0, 2)), BODIES)
+    chosen = _drawn_indices(names, first, np.abs(moved).max(axis=(0, 2)), BODIES)
     panels: list[Panel] = []
     for what, values, unit, width in (("displacement", moved, "m", 1.3), ("velocity", speed, "m/s", 0.9)):
         shown = _without_noise(run, values, unit)
@@ -128,11 +128,11 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
         angle = np.degrees(without_noise(turned.angle, NOISE))
         panels.append((f"{names[k]}: {turned.title} (°)", {"": (angle, {"color": style.INK})}))
     by_body = [panels[k + n * len(chosen)] for k in range(len(chosen)) for n in range(3)]
-    heading = (f"Motion of the bodies{_rest(len(names), BODIES)}", "centre of mass, axes of the world")
+    heading = (f"Motion of the bodies{_shown_count_text(len(names), BODIES)}", "centre of mass, axes of the world")
     return _sheet("motion", run["time"].values, by_body, 3, heading, 1.75, legend=3)
 
 
-def _watched(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
+def _watched_figures(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
     """Draw watched quantities that no other figure shows."""
     others = [quantity for quantity in watched if quantity.component or quantity.kind not in ELSEWHERE]
     panels: list[Panel] = []
@@ -154,7 +154,7 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
     names = [str(name) for name in post["joint"].values]
     force = _without_noise(run, post["reaction"].values, "N")
     drives = [str(name) for name in run["drive"].values] if "drive_force" in run else []
-    chosen = _chosen(names, first, force.max(axis=0), JOINTS)
+    chosen = _drawn_indices(names, first, force.max(axis=0), JOINTS)
     loaded = [k for k in chosen if force[:, k].any()]
     panels: list[Panel] = [
         (f"{names[k]}: force (N)", {"": (force[:, k], {"color": "#0072B2", "lw": 0.9})}) for k in loaded
@@ -164,14 +164,14 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
         panels.append((title, {"": (run["drive_force"].values[:, k], {"color": "#D55E00", "lw": 0.9})}))
     unloaded = [names[k] for k in chosen if k not in loaded]
     below = "; no force: ".join(["magnitude of the joint force", *filter(None, [", ".join(unloaded)])])
-    heading = f"Reactions and drives{_rest(len(names), JOINTS)}", below
+    heading = f"Reactions and drives{_shown_count_text(len(names), JOINTS)}", below
     return _sheet("reactions", run["time"].values, panels, 2, heading) if panels else {}
 
 
 def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
     """Draw orbit, gap and force of each joint with clearance, those in `first` first; call it within `style.style`."""
     names, joints = [str(name) for name in run["contact"].values], parameters(run).get("joint", {})
-    chosen = _chosen(names, first, post["peak_force"].values, CONTACTS)
+    chosen = _drawn_indices(names, first, post["peak_force"].values, CONTACTS)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
     for place, (row, k) in enumerate(zip(axes, chosen, strict=True)):
         unit = quantities.unit(run, Quantity(names[k], "peak_force"))
@@ -201,7 +201,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         text = f"{count}, peak {in_unit(peak, unit)}{closed}"
         row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
     kinds = dict.fromkeys("joints with clearance" if names[k] in joints else "stops" for k in chosen)
-    style.heading(figure, f"{' and '.join(kinds).capitalize()}{_rest(len(names), CONTACTS)}")
+    style.heading(figure, f"{' and '.join(kinds).capitalize()}{_shown_count_text(len(names), CONTACTS)}")
     return style.files("contacts", figure)
 
 
@@ -254,14 +254,14 @@ def _kind(run: xr.Dataset, contact: int) -> Any:
 def _friction(run: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
     names = [str(name) for name in run["rubbing"].values]
     lost, load = run["joint_friction_loss"].values, run["joint_bearing_load"].values
-    chosen = _chosen(names, first, lost[-1], JOINTS)
+    chosen = _drawn_indices(names, first, lost[-1], JOINTS)
     factor, unit = by_unit({"": lost[:, chosen]}, "J")
     colors = list(zip(COLORS, chosen, strict=False))
     panels: list[Panel] = [
         ("normal force in the bearings (N)", {names[k]: (load[:, k], {"color": c, "lw": 0.9}) for c, k in colors}),
         (f"energy lost ({unit})", {names[k]: (factor * lost[:, k], {"color": c}) for c, k in colors}),
     ]
-    heading = (f"Friction of ideal joints{_rest(len(names), JOINTS)}", "")
+    heading = (f"Friction of ideal joints{_shown_count_text(len(names), JOINTS)}", "")
     return _sheet("joint_friction", run["time"].values, panels, 2, heading, 2.4, legend=8)
 
 
@@ -281,7 +281,7 @@ def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
             panel.stairs(factor * depth, edges, fill=True, color="#D55E00")
             panel.set(xlim=(0.0, 360.0), xlabel="angle about z of its frame (°)", xticks=range(0, 361, 90))
             panel.set_title(f"wear depth if only the {what} wears ({unit})")
-    more = _rest(post.sizes["worn"], CONTACTS)
+    more = _shown_count_text(post.sizes["worn"], CONTACTS)
     style.heading(figure, f"Wear of contacts{more}", "Archard's law with the coefficient and hardness of the scene")
     return style.files("wear", figure)
 

@@ -13,7 +13,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from flexclear.post.plotting.style import INK, SOFT, files, heading, panels, plain, style
+from flexclear.post.plotting.style import INK, SOFT, files, heading, panels, set_plain_numbers, style
 from flexclear.scene import units
 from flexclear.scene.load import FAMILIES
 from flexclear.scene.quantity import KINDS
@@ -34,7 +34,7 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
     parameters = [str(name) for name in sweep["status"].dims]
     # values may have any order in a sweep; along an axis they go up
     sweep = sweep.sortby([name for name in parameters if name in sweep.coords and sweep[name].dtype.kind in "fiu"])
-    draw = _drawn(sweep, parameters)
+    draw = _drawing_function(sweep, parameters)
     shown = _panels(sweep, sections=draw is _curve)
     if draw is None or not shown or not (sweep["status"] == 0).any():
         return {}
@@ -75,12 +75,12 @@ def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
         if inner in ((), ("section",)):
             panels[name] = sweep
         elif inner in (("axis",), ("section", "axis")):
-            for axis in _moving(sweep[name]):
+            for axis in _varying_components(sweep[name]):
                 panels[f"{name} {axis}"] = sweep.assign({f"{name} {axis}": sweep[name].sel(axis=axis, drop=True)})
     return panels
 
 
-def _moving(vector: xr.DataArray) -> list[str]:
+def _varying_components(vector: xr.DataArray) -> list[str]:
     """Return components that are not zero at all points, but for rounding; all of them where nothing moves."""
     sizes = abs(vector).max([dim for dim in vector.dims if dim != "axis"])
     axes = [str(axis) for axis in vector["axis"].values[(sizes > ZERO * sizes.max()).values]]
@@ -98,7 +98,7 @@ def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
     return constant
 
 
-def _drawn(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
+def _drawing_function(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
     if parameters == ["point"]:
         names = _coordinates(sweep)
         if not names:
@@ -139,7 +139,7 @@ def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
         ax.axvline(value, color=REFUSED, lw=0.8, ls=":")
     if _in_decades(x):
         ax.set_xscale("log")
-        plain(ax.xaxis)
+        set_plain_numbers(ax.xaxis)
     _label(ax, sweep, parameter, name)
 
 
@@ -165,11 +165,11 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     for axis, values, scale in ((ax.xaxis, x, ax.set_xscale), (ax.yaxis, y, ax.set_yscale)):
         if _in_decades(values):
             scale("log")
-            plain(axis)
+            set_plain_numbers(axis)
         if len(values) <= FEW:  # the cells' own values, which may be uneven
             axis.set_ticks(values, labels=[f"{value:.6g}" for value in values])
             axis.set_ticks([], minor=True)
-    _color_bar(figure, ax, mesh, _written(sweep[name].attrs["units"]))
+    _color_bar(figure, ax, mesh, _unit_text(sweep[name].attrs["units"]))
     ax.grid(False)
     refused = np.argwhere(sweep["status"].values == 1)
     ax.plot(x[refused[:, 1]], y[refused[:, 0]], "x", color=REFUSED, ms=4.0)
@@ -214,17 +214,17 @@ def _color_bar(figure: Figure, ax: Axes, drawn: ScalarMappable, label: str) -> N
 
 
 def _label(ax: Axes, sweep: xr.Dataset, parameter: str, name: str) -> None:
-    ax.set(xlabel=_axis(sweep, parameter), ylabel=_written(sweep[name].attrs["units"]))
+    ax.set(xlabel=_axis(sweep, parameter), ylabel=_unit_text(sweep[name].attrs["units"]))
 
 
 def _scale(sweep: xr.Dataset, parameter: str) -> tuple[float, str]:
     unit, written = (sweep[parameter].attrs.get(key, "") for key in ("units", "written_units"))
     if written and (known := units.unit(written)):
         return 1.0 / known[0], written
-    return HANDY.get(unit, (1.0, _written(unit)))
+    return HANDY.get(unit, (1.0, _unit_text(unit)))
 
 
-def _written(unit: str) -> str:
+def _unit_text(unit: str) -> str:
     """Return the units of a dataset in common notation: ``m/s`` for ``m s-1``, nothing for ``1``."""
     parts = [] if unit == "1" else unit.split()
     over, under = ([p for p in parts if ("-" in p) == below] for below in (False, True))
@@ -235,10 +235,10 @@ def _written(unit: str) -> str:
 
 def _axis(sweep: xr.Dataset, parameter: str) -> str:
     unit = _scale(sweep, parameter)[1]
-    return f"{_of_part(parameter)} ({unit})" if unit else _of_part(parameter)
+    return f"{_part_in_words(parameter)} ({unit})" if unit else _part_in_words(parameter)
 
 
-def _of_part(path: str) -> str:
+def _part_in_words(path: str) -> str:
     """Return a key path in words: ``clearance of pin`` for ``joint.pin.clearance``."""
     first, *keys = path.replace("_", " ").split(".")
     return f"{' '.join(keys[1:])} of {keys[0]}" if first in FAMILIES and len(keys) > 1 else " ".join([first, *keys])

@@ -117,7 +117,7 @@ def scale_of(axes: Axes) -> str:
     return "log" if any((value > 0.0).any() for value in values) else "linear"
 
 
-def plain(axis: Axis) -> None:
+def set_plain_numbers(axis: Axis) -> None:
     """Set plain numbers at 1, 2 and 5 of a logarithmic axis: less than a decade has hardly any power of ten.
 
     Longer ranges have numbers only at powers of ten, since the others would overlap.

@@ -41,7 +41,7 @@ def still(drawn: mechanism.Mechanism, step: int, size: tuple[int, int] = (1200, 
     scene = plotter(size)
     actors = _build(scene, drawn)
     _place(drawn, actors, step, impact=False)
-    look(scene, drawn, margin)
+    place_camera(scene, drawn, margin)
     result = image(scene)
     scene.close()
     return result
@@ -66,7 +66,7 @@ def frames(
     scene = plotter((VIEW, HEIGHT))
     actors = _build(scene, drawn)
     margin = 0 if drawn.stress is None else ruler.BAR
-    look(scene, drawn, margin)
+    place_camera(scene, drawn, margin)
     # matplotlib draws the words below: a text in the scene costs as much as the mechanism
     caption = film_speed.Caption((VIEW, 26), SOFT)
     larger = "".join(f", {text}" for text in ruler.exaggeration(drawn))
@@ -98,7 +98,7 @@ def _in_contact(run: xr.Dataset, before: int, now: int) -> bool:
 def _build(scene: pv.Plotter, drawn: mechanism.Mechanism) -> Actors:
     floor(scene, drawn)
     parts = tuple(solid(scene, part.surface, part.color, part.opacity) for part in drawn.parts)
-    return Actors(parts, tuple(_flexible(scene, drawn, body) for body in drawn.flexible))
+    return Actors(parts, tuple(_surface_of_flexible(scene, drawn, body) for body in drawn.flexible))
 
 
 def solid(scene: pv.Plotter, surface: Surface, color: str, opacity: float, mesh: pv.PolyData | None = None) -> Any:
@@ -109,11 +109,11 @@ def solid(scene: pv.Plotter, surface: Surface, color: str, opacity: float, mesh:
     return actor
 
 
-def _flexible(scene: pv.Plotter, drawn: mechanism.Mechanism, body: mechanism.Flexible) -> pv.PolyData:
-    mesh = skin(mechanism.placed(drawn.run, body, 0)[0], faces(body.bundle))
+def _surface_of_flexible(scene: pv.Plotter, drawn: mechanism.Mechanism, body: mechanism.Flexible) -> pv.PolyData:
+    mesh = skin(mechanism.drawn_points(drawn.run, body, 0)[0], faces(body.bundle))
     mesh["shade"] = mechanism.shade(drawn.run, body, 0)
     q = np.abs(drawn.run.modal_coordinate.values[:, body.columns]).max(axis=1)
-    largest = drawn.stress or max(float(mechanism.placed(drawn.run, body, int(np.argmax(q)))[1].max()), 1e-12)
+    largest = drawn.stress or max(float(mechanism.drawn_points(drawn.run, body, int(np.argmax(q)))[1].max()), 1e-12)
     if body.color is not None:
         scene.add_mesh(mesh, color=body.color, **shading(body.bundle))
         return mesh
@@ -135,7 +135,10 @@ def _place(drawn: mechanism.Mechanism, actors: Actors, step: int, impact: bool) 
         if part.contact is not None:
             actor.prop.color = layout.IMPACT_COLOR if impact else layout.CLEARANCE_COLOR
     for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
-        mesh.points, mesh["shade"] = mechanism.placed(drawn.run, bent, step)[0], mechanism.shade(drawn.run, bent, step)
+        mesh.points, mesh["shade"] = (
+            mechanism.drawn_points(drawn.run, bent, step)[0],
+            mechanism.shade(drawn.run, bent, step),
+        )
 
 
 def floor(scene: pv.Plotter, drawn: mechanism.Mechanism) -> None:
@@ -153,7 +156,7 @@ def floor(scene: pv.Plotter, drawn: mechanism.Mechanism) -> None:
     scene.add_mesh(disc, color="#dfe5ec", ambient=0.12)
 
 
-def look(scene: pv.Plotter, drawn: mechanism.Mechanism, margin: int = 0) -> None:
+def place_camera(scene: pv.Plotter, drawn: mechanism.Mechanism, margin: int = 0) -> None:
     """Place the camera so that everything drawn over the run is in the picture, between its margins [pixels]."""
     width, height = scene.window_size
     position, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)

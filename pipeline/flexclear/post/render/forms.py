@@ -130,7 +130,7 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
         return _plate(points, flat, 1.3 * width, layer)
     middle = points.mean(axis=0)
     bars = [surfaces.bar(middle, point, 0.8 * width) for point in points if np.linalg.norm(point - middle) > width]
-    return surfaces.merged([surfaces.moved(surfaces.sphere(1.2 * width), middle), *bars])
+    return surfaces.join([surfaces.place(surfaces.sphere(1.2 * width), middle), *bars])
 
 
 def _beyond(
@@ -163,8 +163,8 @@ def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
         else:
             part = read(folder / shape["file"], float(shape.get("unit", 1.0)))
         pose = Pose.model_validate(shape.get("pose", {}))
-        drawn.append(surfaces.moved(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
-    return surfaces.merged(drawn)
+        drawn.append(surfaces.place(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
+    return surfaces.join(drawn)
 
 
 def _lone(seats: Sequence[Seat], points: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
@@ -179,19 +179,19 @@ def _lone(seats: Sequence[Seat], points: np.ndarray, com: np.ndarray, solid: Sol
     slide = next((seat for seat in seats if seat.joint in SLIDING), None)
     if slide is not None:
         block = surfaces.box((3.0 * width, 3.0 * width, 4.4 * width))
-        return surfaces.moved(block, point, slide.axes)
+        return surfaces.place(block, point, slide.axes)
     wheel = next((seat for seat in seats if seat.joint in TURNING), None)
     if wheel is not None:
-        return surfaces.moved(_wheel(solid, wheel.axes[:, 2], size), point, surfaces.along(wheel.axes[:, 2]))
+        return surfaces.place(_wheel(solid, wheel.axes[:, 2], size), point, surfaces.along(wheel.axes[:, 2]))
     if any(kind in BALLS for kind in kinds):
         return surfaces.EMPTY
     if solid is None:
-        return surfaces.moved(surfaces.sphere(2.0 * width), point)
+        return surfaces.place(surfaces.sphere(2.0 * width), point)
     half = solid.half * min(1.0, LARGEST * size / float(solid.half.max()))
     if kinds and np.ptp(half) <= 1e-9 * half.max():  # equal moments and fixed to something: a ball
-        return surfaces.moved(surfaces.sphere(float(half[0])), com)
+        return surfaces.place(surfaces.sphere(float(half[0])), com)
     part = surfaces.cylinder(half[0], 2.0 * half[2]) if solid.round else surfaces.box(tuple(2.0 * half))
-    return surfaces.moved(part, com, solid.axes)
+    return surfaces.place(part, com, solid.axes)
 
 
 def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) -> Surface:
@@ -202,24 +202,24 @@ def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) 
         far = com + half * axis
         return surfaces.bar(point, far, _thickness(solid, axis, width))
     radius = 2.4 * width if solid is None else float(np.clip(0.8 * half, 1.8 * width, 4.0 * width))
-    return surfaces.merged([surfaces.bar(point, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
+    return surfaces.join([surfaces.bar(point, com, 0.7 * width), surfaces.place(surfaces.sphere(radius), com)])
 
 
 def wheel_of_gear(seat: Seat, radius: float, size: float, *, inner: bool) -> Surface:
     """Return a gear's wheel in its body's axes [m], as large as its pitch circle; inner: a ring with teeth inwards."""
     width, axes = WIDTH * size, surfaces.along(seat.axes[:, 2])
     if not inner:
-        return surfaces.moved(_disc(radius, width), seat.origin, axes)
+        return surfaces.place(_disc(radius, width), seat.origin, axes)
     middle = np.array([radius + 0.5 * width, 0.0, 0.0])
-    mark = surfaces.moved(surfaces.box((0.8 * width, 0.5 * width, 1.3 * width)), middle)
-    return surfaces.moved(surfaces.merged([ring(radius, radius + width, width), mark]), seat.origin, axes)
+    mark = surfaces.place(surfaces.box((0.8 * width, 0.5 * width, 1.3 * width)), middle)
+    return surfaces.place(surfaces.join([ring(radius, radius + width, width), mark]), seat.origin, axes)
 
 
 def ring(inner: float, outer: float, thick: float) -> Surface:
     """Return a ring about z."""
     half = 0.5 * thick
     profile = np.array([[inner, -half], [outer, -half], [outer, half], [inner, half], [inner, -half]])
-    return surfaces.turned(profile, 4 * surfaces.ROUND)
+    return surfaces.revolve(profile, 4 * surfaces.ROUND)
 
 
 def coil(radius: float, length: float, wire: float) -> Surface:
@@ -242,8 +242,8 @@ def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
 
 
 def _disc(radius: float, width: float) -> Surface:
-    mark = surfaces.moved(surfaces.box((0.7 * radius, 0.5 * width, 1.3 * width)), np.array([0.55 * radius, 0.0, 0.0]))
-    return surfaces.merged([surfaces.cylinder(radius, width), mark])
+    mark = surfaces.place(surfaces.box((0.7 * radius, 0.5 * width, 1.3 * width)), np.array([0.55 * radius, 0.0, 0.0]))
+    return surfaces.join([surfaces.cylinder(radius, width), mark])
 
 
 def _thickness(solid: Solid | None, axis: np.ndarray, width: float) -> float:
@@ -263,7 +263,7 @@ def _plate(points: np.ndarray, normal: np.ndarray, width: float, layer: int) -> 
     middle = points.mean(axis=0)
     flat = (points - middle) @ axes
     thickness = FLAT * width * (1.0 - 0.12 * (layer % 5))
-    return surfaces.moved(surfaces.prism(surfaces.hull(flat[:, :2], width), thickness), middle, axes)
+    return surfaces.place(surfaces.prism(surfaces.hull(flat[:, :2], width), thickness), middle, axes)
 
 
 def _common_axis(seats: Sequence[Seat]) -> np.ndarray | None:
@@ -305,7 +305,7 @@ def read(path: Path, unit: float) -> Surface:
     faces = []
     for block in mesh.cells:
         if block.type in ("triangle", "quad"):
-            faces.append(surfaces.triangulated(block.data.astype(int)))
+            faces.append(surfaces.triangulate(block.data.astype(int)))
         elif block.type in _SIDES:
             faces.append(_boundary(block.data.astype(int), _SIDES[block.type]))
     if not faces:
@@ -317,14 +317,14 @@ def read(path: Path, unit: float) -> Surface:
         raise InputError(f"{path}", f"its faces refer to points beyond its {len(points)} ones", "export it again")
     if not np.abs(points).max(initial=0.0) < FARTHEST:
         raise InputError(f"{path}", "its points are not finite numbers, or too large to be drawn", "export it again")
-    return surfaces.shaded(points, triangles, sharp=True)
+    return surfaces.with_normals(points, triangles, sharp=True)
 
 
 def _boundary(cells: np.ndarray, sides: tuple[tuple[int, ...], ...]) -> np.ndarray:
     """Return triangles of the faces that belong to one cell only."""
     faces = cells[:, list(sides)].reshape(-1, len(sides[0]))
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return surfaces.triangulated(faces[first[count == 1]])
+    return surfaces.triangulate(faces[first[count == 1]])
 
 
 #: function of a frame's name that returns origin [m] and axes in the world, at the start

@@ -23,28 +23,28 @@ _PROBE = (
 
 def state() -> str:
     """Name the GL libraries of this machine; quick, fit for a cache key; a final none: nothing can be drawn."""
-    if missing():
-        return f"without {' and '.join(missing())}: none"
+    if missing_libraries():
+        return f"without {' and '.join(missing_libraries())}: none"
     if not sys.platform.startswith("linux"):
         return f"GL of {sys.platform}"
     libraries = [name for name in ("libGL.so.1", "libEGL.so.1", "libOSMesa.so.8") if _loads(name)]
     return "GL: " + (", ".join(libraries) or "none")
 
 
-def missing() -> list[str]:
+def missing_libraries() -> list[str]:
     """Return the missing ones of the libraries that draw."""
     return [name for name in LIBRARIES if find_spec(name) is None]
 
 
 def remedy() -> str:
     """Return the remedy where nothing can be drawn."""
-    return EXTRA if missing() else REMEDY
+    return EXTRA if missing_libraries() else REMEDY
 
 
 @cache
 def works() -> bool:
     """True when a child process could draw off-screen; takes some seconds the first time."""
-    if missing():
+    if missing_libraries():
         return False
     try:
         done = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, timeout=120, check=False)

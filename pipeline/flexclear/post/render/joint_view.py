@@ -37,7 +37,7 @@ def with_clearance(run: xr.Dataset) -> list[int]:
     return [k for k, name in enumerate(run["contact"].values) if str(name) in joints] if "contact" in run.sizes else []
 
 
-def shown(run: xr.Dataset, contact: int) -> JointView:
+def drawn_joint(run: xr.Dataset, contact: int) -> JointView:
     """Return the drawn surfaces of one joint with clearance."""
     offset = run["contact_offset"].values[:, contact]
     room, half = _room(parameters(run)["joint"][str(run["contact"].values[contact])], offset)
@@ -58,7 +58,7 @@ def _room(given: dict, offset: np.ndarray) -> tuple[Surface, float]:
         low, high = offset.min(axis=0), offset.max(axis=0)
         reach = max(float((high - low).max()), 2.0 * float(given["ball_radius"]))
         plane = surfaces.box((*((high - low)[:2] + 0.4 * reach), 0.005 * reach))
-        return surfaces.moved(plane, np.array([*(0.5 * (low + high))[:2], given["ball_radius"]])), 0.6 * reach
+        return surfaces.place(plane, np.array([*(0.5 * (low + high))[:2], given["ball_radius"]])), 0.6 * reach
     clearance = float(given["clearance"])
     if kind.ideal == "spherical":
         return surfaces.sphere(clearance), clearance

@@ -117,7 +117,7 @@ class Layout:
     def seated(self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
         """Return a part at a frame, given in the frame's axes."""
         site, axes = self.site(frame), self.local(frame)[1]
-        return Part(site.owner, surfaces.moved(part, site.origin, axes), color, opacity, site.frame, contact)
+        return Part(site.owner, surfaces.place(part, site.origin, axes), color, opacity, site.frame, contact)
 
 
 def samples(run: xr.Dataset) -> list[int]:

@@ -35,9 +35,9 @@ def loads(at: Layout, size: float, bodies: Sequence[Part]) -> Iterator[Part]:
             yield from _bushing(at, load, size)
         elif "between" in load:
             first, second = load["between"]
-            yield from _between(at.run, (at.site(first), at.site(second)), load, COIL * size)
+            yield from _spring_between(at.run, (at.site(first), at.site(second)), load, COIL * size)
         elif load["type"] == "joint-spring":
-            yield from _on_joint(at, load, size, bodies)
+            yield from _spring_on_joint(at, load, size, bodies)
 
 
 def _bushing(at: Layout, load: Mapping[str, Any], size: float) -> Iterator[Part]:
@@ -47,11 +47,11 @@ def _bushing(at: Layout, load: Mapping[str, Any], size: float) -> Iterator[Part]
     axis = min((2, 0, 1), key=lambda k: abs(along[(k + 1) % 3] - along[(k + 2) % 3]))
     turn, pin = surfaces.along(np.eye(3)[axis]), PIN * size
     ring = forms.ring(1.05 * pin, 2.8 * pin, 3.0 * pin)
-    yield at.seated(first, surfaces.moved(ring, np.zeros(3), turn), LOAD_COLOR)
-    yield at.seated(second, surfaces.moved(surfaces.cylinder(pin, 4.2 * pin), np.zeros(3), turn), JOINT_COLOR)
+    yield at.seated(first, surfaces.place(ring, np.zeros(3), turn), LOAD_COLOR)
+    yield at.seated(second, surfaces.place(surfaces.cylinder(pin, 4.2 * pin), np.zeros(3), turn), JOINT_COLOR)
 
 
-def _on_joint(at: Layout, load: Mapping[str, Any], size: float, bodies: Sequence[Part]) -> Iterator[Part]:
+def _spring_on_joint(at: Layout, load: Mapping[str, Any], size: float, bodies: Sequence[Part]) -> Iterator[Part]:
     """Yield a spring along a joint's axis, on the side where it is pressed and around the body that slides, or a coil
     about the axis."""
     name, joint = load["joint"], at.given["joint"][load["joint"]]
@@ -72,14 +72,14 @@ def _on_joint(at: Layout, load: Mapping[str, Any], size: float, bodies: Sequence
         ]
         radius = max([COIL * size, *(1.15 * one for one in around)])
         anchor = (high if side > 0.0 else low) + side * max(FREE * size, 3.0 * radius)
-        yield from _between(at.run, (at.site(first, anchor), at.site(second)), load, radius)
+        yield from _spring_between(at.run, (at.site(first, anchor), at.site(second)), load, radius)
     elif load.get("stiffness"):
         radius, long = 2.2 * PIN * size, 3.0 * PIN * size
-        coil = surfaces.moved(forms.coil(radius, long, 0.2 * radius), np.array([0.0, 0.0, -0.5 * long]))
+        coil = surfaces.place(forms.coil(radius, long, 0.2 * radius), np.array([0.0, 0.0, -0.5 * long]))
         yield at.seated(second, coil, LOAD_COLOR)
 
 
-def _between(run: xr.Dataset, ends: tuple[Site, Site], load: Mapping[str, Any], radius: float) -> Iterator[Part]:
+def _spring_between(run: xr.Dataset, ends: tuple[Site, Site], load: Mapping[str, Any], radius: float) -> Iterator[Part]:
     """Yield what acts along a line between two points: a coil of this radius [m], a cylinder with its piston, both, or
     a thin bar."""
     lengths = [float(np.linalg.norm(np.subtract(*(site.position(run, k) for site in ends)))) for k in samples(run)]
@@ -95,8 +95,8 @@ def _between(run: xr.Dataset, ends: tuple[Site, Site], load: Mapping[str, Any], 
     if load.get("damping"):
         half = min(0.6 * long, 0.95 * min(lengths))
         for sites, thick, color in ((ends, 0.6, GROUND_COLOR), (ends[::-1], 0.3, JOINT_COLOR)):
-            rod = surfaces.moved(surfaces.cylinder(thick * radius, half), np.array([0.0, 0.0, 0.5 * half]))
+            rod = surfaces.place(surfaces.cylinder(thick * radius, half), np.array([0.0, 0.0, 0.5 * half]))
             yield part(rod, color, (sites[0], sites[1]))
     if not load.get("stiffness") and not load.get("damping"):
-        bar = surfaces.moved(surfaces.cylinder(0.2 * radius, long), np.array([0.0, 0.0, 0.5 * long]))
+        bar = surfaces.place(surfaces.cylinder(0.2 * radius, long), np.array([0.0, 0.0, 0.5 * long]))
         yield part(bar, LOAD_COLOR, length=long)

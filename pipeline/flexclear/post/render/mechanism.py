@@ -110,10 +110,12 @@ def mechanism(
             "--what stress", problem, 'request it: [output] stress = ["BODY"], a rod of known section or a solid'
         )
     flexible = tuple(
-        _flexible(run, name, bundle, looks, stressed=stressed) for name, bundle in bundles.items() if name in at.bodies
+        _flexible_body(run, name, bundle, looks, stressed=stressed)
+        for name, bundle in bundles.items()
+        if name in at.bodies
     )
     positions = run.frame_position.values if at.frames else run.position.values
-    shown = np.concatenate([positions.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
+    shown = np.concatenate([positions.reshape(-1, 3), *(drawn_points(run, body, 0)[0] for body in flexible)])
     size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
     bodies = tuple(_bodies(at, looks, size))
     parts = (*bodies, *_joints(at, size), *loads(at, size, bodies))
@@ -147,11 +149,11 @@ def cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible], 
             corners = np.where(_CORNERS, high, low)
             matrix = part_pose(run, part, step)
             clouds.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
-        clouds += [placed(run, body, step)[0][::7] for body in flexible]
+        clouds += [drawn_points(run, body, step)[0][::7] for body in flexible]
     return np.concatenate(clouds) if clouds else run.position.values[0]
 
 
-def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
+def drawn_points(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
     """Return world points of the exaggerated surface, shape (point, 3), and their true displacement [m], (point,)."""
     q = run.modal_coordinate.values[step, body.columns]
     points, size = surface(body.bundle, q, body.scale)
@@ -161,18 +163,18 @@ def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.n
 
 
 def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
-    """Return the coloured values at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
+    """Return the coloured values at the points of `drawn_points`: von Mises stress [Pa], or displacement [m]."""
     if body.stressed:
         return body_shape.stress_on_surface(run, body.bundle, names(run, "body")[body.index], step)
-    return placed(run, body, step)[1]
+    return drawn_points(run, body, step)[1]
 
 
 def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surface:
-    """Return the surface of a flexible body through points as of `placed` or `rest`; empty for bare nodes.
+    """Return the surface of a flexible body through points as of `drawn_points` or `rest`; empty for bare nodes.
 
     Unless `sharp`, points keep their number, so that fields fit; edges of solids are then shaded softly.
     """
-    return surfaces.shaded(points, surfaces.triangulated(faces(bundle)), sharp=sharp)
+    return surfaces.with_normals(points, surfaces.triangulate(faces(bundle)), sharp=sharp)
 
 
 def rest(bundle: xr.Dataset) -> np.ndarray:
@@ -207,7 +209,7 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
                 yield Part(None, own, look.get("color", GROUND_COLOR))
         elif name in at.bundles:
             if own is not None:  # shapes fixed to the deformed mesh
-                yield Part(owner, surfaces.moved(own, -at.centre(name)), look.get("color", COLORS[0]))
+                yield Part(owner, surfaces.place(own, -at.centre(name)), look.get("color", COLORS[0]))
         elif "inertia" in body:
             com, inertia = at.centre(name), np.array(body["inertia"])
             key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
@@ -216,7 +218,7 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
             solid = equivalent(body["mass"], inertia) if np.any(inertia) and body["mass"] else None
             drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
             if len(drawn.points):
-                yield Part(owner, surfaces.moved(drawn, -com), color)
+                yield Part(owner, surfaces.place(drawn, -com), color)
 
 
 def rod_of(name: str, body: Mapping[str, Any]) -> str:
@@ -235,8 +237,8 @@ def _with_wheels(
         for wheel in geared
     ]
     if discs and all(np.linalg.norm(seat.origin - seats[0].origin) < 1e-9 for seat in seats):
-        return surfaces.merged(discs)  # the body is the wheel
-    return surfaces.merged([*discs, forms.link(seats, com, solid, size, layer)])
+        return surfaces.join(discs)  # the body is the wheel
+    return surfaces.join([*discs, forms.link(seats, com, solid, size, layer)])
 
 
 def _joints(at: Layout, size: float) -> Iterator[Part]:
@@ -271,11 +273,11 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
             low, high = travel(at.run, name)
             rail = surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size)
             middle = np.array([0.0, 0.0, 0.5 * (low + high)])
-            yield at.seated(first, surfaces.moved(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
+            yield at.seated(first, surfaces.place(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
         elif kind == "universal":
             for frame, axis in ((first, np.eye(3)[0]), (second, np.eye(3)[1])):
                 arm = surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size)
-                yield at.seated(frame, surfaces.moved(arm, np.zeros(3), surfaces.along(axis)), color)
+                yield at.seated(frame, surfaces.place(arm, np.zeros(3), surfaces.along(axis)), color)
         elif kind == "planar":
             yield at.seated(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
 
@@ -291,10 +293,10 @@ def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
         low, high = path.min(axis=0)[:2], path.max(axis=0)[:2]
         reach = 2.5 * float(joint["ball_radius"])
     plane = surfaces.box((*(high - low + 2.0 * reach), 0.004 * size))
-    return surfaces.moved(plane, np.array([*(0.5 * (low + high)), -0.002 * size]))
+    return surfaces.place(plane, np.array([*(0.5 * (low + high)), -0.002 * size]))
 
 
-def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:
+def _flexible_body(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:
     columns = np.flatnonzero(run.mode_body.values == name)
     q = run.modal_coordinate.values[:, columns]
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]

@@ -82,13 +82,13 @@ def panel(
     figure = canvas.figure
     axes = figure.subplots(3 if contact else 2, 1, height_ratios=[1, 1, 1.7] if contact else [1, 1])
     lines = {line.title: line for quantity in curves for line in watched_curves([run], quantity) if line is not None}
-    cursors = [_watched(panel, run, line) for panel, line in zip(axes, list(lines.values())[:2], strict=False)]
+    cursors = [_watched_curves(panel, run, line) for panel, line in zip(axes, list(lines.values())[:2], strict=False)]
     if not cursors:
         cursors.append(_motion(axes[0], run, post, _body(run, watch)))
     if len(cursors) < 2:
         cursors.append((_reaction if post.sizes["joint"] else _energy)(axes[1], run, post, watch))
     if contact:
-        number = list(run["contact"].values).index(loose[_first(loose, watch) or 0])
+        number = list(run["contact"].values).index(loose[_first_watched(loose, watch) or 0])
         x, y = orbit(axes[2], run, float(post.clearance[number]), number)
         axes[2].set_title(f"{run['contact'].values[number]} {centre(run, number).removeprefix('centre ')}")
         cursors.append(Cursor(_dot(axes[2], 7), x, y))
@@ -140,7 +140,7 @@ def _fit(title: Any, axes: style.Axes, canvas: FigureCanvasAgg) -> None:
     title.set_x((left - axes.bbox.x0) / axes.bbox.width)
 
 
-def _first(names: Iterable[object], watch: Sequence[str]) -> int | None:
+def _first_watched(names: Iterable[object], watch: Sequence[str]) -> int | None:
     """Return the index of the first watched one among names; None where none is watched."""
     known = [str(name) for name in names]
     return next((known.index(name) for name in watch if name in known), None)
@@ -148,7 +148,7 @@ def _first(names: Iterable[object], watch: Sequence[str]) -> int | None:
 
 def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
     """Return the first watched body; else the one that moves farthest."""
-    name = _first(run.body.values, watch)
+    name = _first_watched(run.body.values, watch)
     if name is not None:
         return name
     distance = np.linalg.norm(run.position.values - run.position.values[:1], axis=-1)
@@ -180,7 +180,7 @@ def _reaction(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, watch: Sequen
     return _curve(axes, run, post.reaction.sel(joint=name).values, "#D55E00", 0.8)
 
 
-def _watched(axes: style.Axes, run: xr.Dataset, line: Curve) -> Cursor:
+def _watched_curves(axes: style.Axes, run: xr.Dataset, line: Curve) -> Cursor:
     factor, unit = by_unit({"": line.values}, line.unit)
     axes.set_title(f"{line.title} ({unit})")
     return _curve(axes, run, factor * line.values, "#0072B2", 1.2)

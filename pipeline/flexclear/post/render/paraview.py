@@ -16,7 +16,7 @@ import xarray as xr
 
 from flexclear.post.render import surfaces
 from flexclear.post.render.layout import part_pose
-from flexclear.post.render.mechanism import Mechanism, placed, skin
+from flexclear.post.render.mechanism import Mechanism, drawn_points, skin
 from flexclear.post.render.surfaces import Surface
 from flexclear.post.shapes.body_shape import surface
 from flexclear.post.single_run.series import parameters
@@ -71,15 +71,15 @@ def _bodies(drawn: Mechanism, step: int) -> bytes:
     shapes, numbers, moved = [], [], []
     for part in drawn.parts:
         matrix = part_pose(drawn.run, part, step)
-        shapes.append(surfaces.moved(part.surface, matrix[:3, 3], matrix[:3, :3]))
+        shapes.append(surfaces.place(part.surface, matrix[:3, 3], matrix[:3, :3]))
         numbers.append(np.full(len(part.surface.points), -1 if part.owner is None else part.owner))
         moved.append(np.zeros(len(part.surface.points)))
     for body in drawn.flexible:
-        points, size = placed(drawn.run, body, step)
+        points, size = drawn_points(drawn.run, body, step)
         shapes.append(skin(body.bundle, points))
         numbers.append(np.full(len(points), body.index))
         moved.append(size)
-    return vtp(surfaces.merged(shapes), {"body": np.concatenate(numbers), "displacement": np.concatenate(moved)})
+    return vtp(surfaces.join(shapes), {"body": np.concatenate(numbers), "displacement": np.concatenate(moved)})
 
 
 def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
@@ -90,7 +90,7 @@ def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
             if length > 0.01 * LONGEST * drawn.size:
                 shapes.append(arrow(point, value / np.linalg.norm(value) * length, THICK * drawn.size))
                 forces.append(np.tile(value, (len(shapes[-1].points), 1)))
-    return vtp(surfaces.merged(shapes), {"force": np.concatenate(forces) if forces else np.empty((0, 3))})
+    return vtp(surfaces.join(shapes), {"force": np.concatenate(forces) if forces else np.empty((0, 3))})
 
 
 def arrow(point: np.ndarray, vector: np.ndarray, thick: float) -> Surface:
@@ -98,7 +98,7 @@ def arrow(point: np.ndarray, vector: np.ndarray, thick: float) -> Surface:
     length = float(np.linalg.norm(vector))
     head = min(6.0 * thick, 0.4 * length)
     neck = point + (1.0 - head / length) * vector
-    return surfaces.merged([surfaces.bar(point, neck, thick), surfaces.cone(neck, point + vector, 2.4 * thick)])
+    return surfaces.join([surfaces.bar(point, neck, thick), surfaces.cone(neck, point + vector, 2.4 * thick)])
 
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:

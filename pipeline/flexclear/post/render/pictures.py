@@ -83,7 +83,7 @@ def _still(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, byte
     step = int(np.argmax(drawn.run["von_mises_stress"].values.max(axis=1) if stressed else moved))
     drawn = replace(drawn, cloud=cloud(drawn.run, drawn.parts, drawn.flexible, [step]))
     picture = film.still(drawn, step, margin=margin)
-    return {f"{'stress' if stressed else 'mechanism'}.png": png(ruler.annotated(picture, drawn, margin))}
+    return {f"{'stress' if stressed else 'mechanism'}.png": png(ruler.with_scale_bar(picture, drawn, margin))}
 
 
 def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
@@ -205,7 +205,7 @@ def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
     return files
 
 
-def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
+def _vibrating_mechanism(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
     """Return the mechanism at rest, and its vibrations about that pose."""
     assert shown.linear is not None
     if not bool((shown.linear["frequency"] > 0.0).any()):
@@ -215,20 +215,22 @@ def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
 
 
 def _vibration_page(shown: Shown, kind: str) -> dict[str, bytes]:
-    drawn, vibrating = _vibrating(shown)
+    drawn, vibrating = _vibrating_mechanism(shown)
     view = viewer(player.vibrations(drawn, vibrating), f"{len(vibrating.labels)} natural vibrations", play=True)
     return {"vibrations.html": shown.page("natural vibrations", [view])}
 
 
 def _vibration_sheet(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
-    return {"vibrations.png": png(vibrations.sheet(*_vibrating(shown)))}
+    return {"vibrations.png": png(vibrations.sheet(*_vibrating_mechanism(shown)))}
 
 
 def _vibrations(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
     rate = film_speed.rate(kind)
-    suffix, content = film_speed.write(vibrations.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
+    suffix, content = film_speed.write(
+        vibrations.frames(*_vibrating_mechanism(shown), rate, shown.progress), rate, kind
+    )
     return {f"vibrations.{suffix}": content}
 
 

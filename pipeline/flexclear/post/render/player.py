@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.numerics.rotations import matrix_to_quaternion
-from flexclear.post.overview.curves import in_unit, scaled
+from flexclear.post.overview.curves import in_unit, readable_unit
 from flexclear.post.render import film_speed, joint_view, layout, mechanism, surfaces
 from flexclear.post.render.vibrations import Vibrations
 from flexclear.post.render.view import View, axes_of, eye
@@ -46,7 +46,7 @@ def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     return {
         "meshes": meshes,
         "tracks": [_floats(track) for track in tracks_of],
-        "times": _rounded(run, steps),
+        "times": _rounded_times(run, steps),
         "rate": len(steps) / (drawn.looks.duration or film_speed.SECONDS),
         "exaggeration": max((body.scale for body in drawn.flexible), default=1.0),
         **({"readings": [_largest_stress(drawn, steps)]} if drawn.stress else {}),
@@ -55,7 +55,7 @@ def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
 
 
 def _largest_stress(drawn: mechanism.Mechanism, steps: np.ndarray) -> dict[str, Any]:
-    factor, unit = scaled(drawn.stress or 0.0, "Pa")
+    factor, unit = readable_unit(drawn.stress or 0.0, "Pa")
     values = factor * body_shape.stress_of_bodies(drawn.run)[steps].max(axis=1)
     return {"label": "largest stress", "unit": unit, "values": [float(f"{v:.4g}") for v in values]}
 
@@ -65,7 +65,7 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, An
 
     contact: index of a joint with clearance, not of the end of a stop.
     """
-    steps, shown = _steps(run, looks, FRAMES), joint_view.shown(run, contact)
+    steps, shown = _steps(run, looks, FRAMES), joint_view.drawn_joint(run, contact)
     centre = run["contact_offset"].values[steps, contact]
     unturned = np.tile([1.0, 0.0, 0.0, 0.0, 1.0], (len(steps), 1))
     readings = [
@@ -82,7 +82,7 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, An
             _still(shown.room, layout.SOCKET_COLOR, 0.3) | {"track": -1},
         ],
         "tracks": [_floats(np.column_stack([centre, unturned]))],
-        "times": _rounded(run, steps),
+        "times": _rounded_times(run, steps),
         "rate": len(steps) / (looks.duration or film_speed.SECONDS),
         "readings": readings,
         "exaggeration": 1.0,
@@ -100,7 +100,7 @@ def modes(bundle: xr.Dataset) -> dict[str, Any]:
         {"label": name, "fields": [k, None], "scale": float(scale[k]), "largest": float(largest[k]) or 1.0}
         for k, name in enumerate(names)
     ]
-    mesh = _skin(bundle, points) | {"fields": [_scaled(values) for values in fields], "track": -1}
+    mesh = _skin(bundle, points) | {"fields": [_as_16_bits(values) for values in fields], "track": -1}
     ghost = _skin(bundle, points) | {"track": -1, "opacity": 0.18, "color": "#7c8894"}
     return {"meshes": [mesh, ghost], "shapes": shapes, "unit": 1.0, **_camera(side(bundle), points)}
 
@@ -119,7 +119,7 @@ def vibrations(drawn: mechanism.Mechanism, linear: Vibrations) -> dict[str, Any]
     for piece in linear.pieces:
         mesh = _still(piece.surface, piece.color, piece.opacity) | {"track": -1, "plain": piece.plain}
         if piece.moved.any():
-            mesh["fields"] = [_scaled(f) for f in piece.moved.reshape(-1, *piece.moved.shape[2:])]
+            mesh["fields"] = [_as_16_bits(f) for f in piece.moved.reshape(-1, *piece.moved.shape[2:])]
             mesh.pop("normals")
         meshes.append(mesh)
     shapes = [
@@ -149,7 +149,7 @@ def _steps(run: xr.Dataset, looks: mechanism.Looks, frames: int) -> np.ndarray:
     return film_speed.frame_times(run, looks.duration, looks.impact_slowdown).steps(run, frames)
 
 
-def _rounded(run: xr.Dataset, steps: np.ndarray) -> list[float]:
+def _rounded_times(run: xr.Dataset, steps: np.ndarray) -> list[float]:
     return [round(float(t), 9) for t in run["time"].values[steps]]
 
 
@@ -159,7 +159,7 @@ def _bent(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[
     some = np.unique(np.linspace(0, len(q) - 1, 60).astype(int))
     largest = max(float(np.linalg.norm(np.tensordot(q[k], fields, axes=1), axis=1).max()) for k in some)
     content = _skin(bundle, mechanism.rest(bundle)) | {
-        "fields": [_scaled(values) for values in fields],
+        "fields": [_as_16_bits(values) for values in fields],
         "weights": _floats(q[steps]),
         "largest": largest,
     }
@@ -194,7 +194,7 @@ def _still(part: surfaces.Surface, color: str, opacity: float) -> dict[str, Any]
 
 def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
     """Return a skin whose points keep their number, so that fields fit; sharp edges of solids are shaded softly."""
-    triangles = surfaces.triangulated(faces(bundle))
+    triangles = surfaces.triangulate(faces(bundle))
     return {"points": _floats(points), "triangles": _wholes(triangles), "color": mechanism.COLORS[0], "opacity": 1.0}
 
 
@@ -214,7 +214,7 @@ def _wholes(values: np.ndarray) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype="<u4").tobytes()).decode()
 
 
-def _scaled(values: np.ndarray) -> dict[str, Any]:
+def _as_16_bits(values: np.ndarray) -> dict[str, Any]:
     """Return numbers as 16 bits of their largest: three digits are more than a picture shows."""
     largest = float(np.abs(values).max(initial=0.0)) or 1.0
     data = np.round(values / largest * 32767).astype("<i2")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.post.overview.curves import in_unit, rounded, scaled
+from flexclear.post.overview.curves import format_to_digits, in_unit, readable_unit
 from flexclear.post.plotting import style
 from flexclear.post.render.mechanism import SOCKET, Mechanism
 from flexclear.post.render.view import ANGLE, axes_of, eye
@@ -41,7 +41,7 @@ def round_length(most: float) -> float:
 def exaggeration(drawn: Mechanism) -> list[str]:
     """Return sentences on exaggerated parts with their factors, and on the colours of deflection."""
     scale = max((body.scale for body in drawn.flexible), default=0.0)
-    larger = "true deformation" if scale == 1.0 else f"deformation {rounded(scale, 3)} times larger"
+    larger = "true deformation" if scale == 1.0 else f"deformation {format_to_digits(scale, 3)} times larger"
     texts = [larger] if drawn.flexible else []
     if any(body.color is None and not body.stressed for body in drawn.flexible):
         texts.append("brightest at the largest deflection of a body")
@@ -56,7 +56,7 @@ def exaggeration(drawn: Mechanism) -> list[str]:
     return texts
 
 
-def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarray:
+def with_scale_bar(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarray:
     """Return a picture as of `film.still` with a bar and the factors of exaggeration, same shape."""
     height, width = pixels.shape[:2]
     if drawn.stress is not None:
@@ -77,7 +77,7 @@ def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarr
 
 def color_bar(largest: float, height: int) -> np.ndarray:
     """Return the colours of stress from zero to the largest [Pa], with numbers: pixels (height, BAR, 3)."""
-    factor, unit = scaled(largest, "Pa")
+    factor, unit = readable_unit(largest, "Pa")
     canvas = style.canvas((BAR, height))
     axes = canvas.figure.add_axes((0.16, 0.25, 0.16, 0.5))
     axes.imshow(np.linspace(1.0, 0.0, 256)[:, None], aspect="auto", cmap=STRESS_COLORS, extent=(0.0, 1.0, 0.0, 1.0))

@@ -140,26 +140,26 @@ def _lines(
             yield surfaces.bar(where - AXIS * size * z, where + AXIS * size * z, THIN * size), JOINT
         if name in driven and (slides or kind in forms.TURNING):
             turns = not slides or driven[name].get("coordinate") == "rotation"
-            yield (_turning if turns else _sliding)(where, axes, size), DRIVE
+            yield (_round_arrow if turns else _straight_arrow)(where, axes, size), DRIVE
     for gap in gaps:
         if np.linalg.norm(gap.end - gap.start) > 0.0:
             yield surfaces.bar(gap.start, gap.end, THICK * size), GAP
-            yield surfaces.moved(surfaces.sphere(2.0 * THICK * size), gap.start), GAP
+            yield surfaces.place(surfaces.sphere(2.0 * THICK * size), gap.start), GAP
 
 
-def _turning(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
+def _round_arrow(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     """Return a round arrow about the axis, in the sense in which the joint's coordinate grows."""
     angle = np.linspace(0.2, 1.5 * np.pi, 40)[:, None]
     ring = where + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
     direction = ring[-1] - ring[-2]
-    return surfaces.merged([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], direction, size)])
+    return surfaces.join([surfaces.tube(ring, 1.8 * THIN * size), _head(ring[-1], direction, size)])
 
 
-def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
+def _straight_arrow(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     """Return an arrow along the axis, next to it."""
     side = where + 0.5 * ARC * size * axes[:, 0]
     end = side + 1.5 * AXIS * size * axes[:, 2]
-    return surfaces.merged([surfaces.bar(side, end, 1.8 * THIN * size), _head(end, axes[:, 2], size)])
+    return surfaces.join([surfaces.bar(side, end, 1.8 * THIN * size), _head(end, axes[:, 2], size)])
 
 
 def _head(base: np.ndarray, direction: np.ndarray, size: float) -> Surface:
@@ -183,7 +183,7 @@ def _marks(
         segment, count = body.get("segment", (1, 1))
         if body["type"] != "ground" and segment == (count + 1) // 2:  # a rod in segments has one name, at its middle
             index = list(run["body"].values).index(name)
-            detail = _of_body(body) if count == 1 else f"flexible, {count} segments"
+            detail = _body_label(body) if count == 1 else f"flexible, {count} segments"
             yield Mark(mechanism.rod_of(name, body), detail, _middle(run, drawn, index), BODY)
     for name, joint in text.get("joint", {}).items():
         used |= set(joint["between"])
@@ -239,7 +239,7 @@ def _range(stop: Mapping[str, Any], kind: str) -> str:
     return ", ".join(f"{e} {f'{np.degrees(v):.4g}°' if turns else in_unit(v, 'm')}" for e, v in ends.items())
 
 
-def _of_body(body: Mapping[str, Any]) -> str:
+def _body_label(body: Mapping[str, Any]) -> str:
     flexible = "flexible, " if body["type"] == "flexible" else ""
     return f"{flexible}{body['mass']:.4g} kg" if "mass" in body else f"{flexible}body".replace(", body", "")
 

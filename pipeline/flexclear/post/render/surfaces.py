@@ -27,7 +27,7 @@ class Surface:
 EMPTY = Surface(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3), dtype=int))
 
 
-def merged(parts: Sequence[Surface]) -> Surface:
+def join(parts: Sequence[Surface]) -> Surface:
     """Join several surfaces into one."""
     if not parts:
         return EMPTY
@@ -39,7 +39,7 @@ def merged(parts: Sequence[Surface]) -> Surface:
     )
 
 
-def moved(surface: Surface, origin: np.ndarray, axes: np.ndarray | None = None) -> Surface:
+def place(surface: Surface, origin: np.ndarray, axes: np.ndarray | None = None) -> Surface:
     """Return the surface of a frame with this origin [m] and these axes (columns), in axes of the frame's parent."""
     R = np.eye(3) if axes is None else axes
     return Surface(surface.points @ R.T + origin, surface.normals @ R.T, surface.triangles)
@@ -61,11 +61,11 @@ def prism(outline: np.ndarray, thickness: float) -> Surface:
     flat = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
     pairs = np.stack([flat, flat], axis=1)
     ends = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
-    wall = np.concatenate([_at(ends, -h), _at(ends, h)], axis=1).reshape(-1, 3)
-    normal = np.concatenate([_at(pairs, 0.0), _at(pairs, 0.0)], axis=1).reshape(-1, 3)
+    wall = np.concatenate([_points_at_height(ends, -h), _points_at_height(ends, h)], axis=1).reshape(-1, 3)
+    normal = np.concatenate([_points_at_height(pairs, 0.0), _points_at_height(pairs, 0.0)], axis=1).reshape(-1, 3)
     k = 4 * np.arange(n)[:, None, None]
     walls = Surface(wall, normal, (k + np.array([[0, 1, 3], [0, 3, 2]])).reshape(-1, 3))
-    return merged([walls, *(_cap(outline, centre, side * h, side) for side in (1.0, -1.0))])
+    return join([walls, *(_cap(outline, centre, side * h, side) for side in (1.0, -1.0))])
 
 
 def hull(positions: np.ndarray, margin: float) -> np.ndarray:
@@ -76,7 +76,7 @@ def hull(positions: np.ndarray, margin: float) -> np.ndarray:
     return spread[ConvexHull(spread).vertices]
 
 
-def turned(profile: np.ndarray, corners: int = ROUND) -> Surface:
+def revolve(profile: np.ndarray, corners: int = ROUND) -> Surface:
     """Return a surface of revolution about z, round there and with sharp edges along its profile.
 
     profile: radius and height of points [m], shape (n, 2), from the lower end to the upper one along the outside.
@@ -89,13 +89,13 @@ def turned(profile: np.ndarray, corners: int = ROUND) -> Surface:
         points = np.concatenate([ends[:, None, :1] * across, np.repeat(ends[:, None, 1:], corners + 1, axis=1)], axis=2)
         normals = np.insert(radial * across, 2, upwards, axis=2)
         bands.append(Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(2, corners + 1)[:, ::-1]))
-    return merged(bands)
+    return join(bands)
 
 
 def cylinder(radius: float, length: float) -> Surface:
     """Return a cylinder about the origin, its axis along z."""
     half = 0.5 * length
-    return turned(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
+    return revolve(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
 
 
 def box(size: Sequence[float]) -> Surface:
@@ -117,13 +117,13 @@ def sphere(radius: float) -> Surface:
 def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
     """Return a round bar with flat ends."""
     axis = end - start
-    return moved(cylinder(radius, float(np.linalg.norm(axis))), 0.5 * (start + end), along(axis))
+    return place(cylinder(radius, float(np.linalg.norm(axis))), 0.5 * (start + end), along(axis))
 
 
 def cone(base: np.ndarray, tip: np.ndarray, radius: float) -> Surface:
     """Return a round cone, closed below."""
-    side = turned(np.array([[0.0, 0.0], [radius, 0.0], [0.0, np.linalg.norm(tip - base)]]))
-    return moved(side, base, along(tip - base))
+    side = revolve(np.array([[0.0, 0.0], [radius, 0.0], [0.0, np.linalg.norm(tip - base)]]))
+    return place(side, base, along(tip - base))
 
 
 def tube(positions: np.ndarray, radius: float, corners: int = 6) -> Surface:
@@ -131,7 +131,7 @@ def tube(positions: np.ndarray, radius: float, corners: int = 6) -> Surface:
     distinct = np.concatenate([[True], np.linalg.norm(np.diff(positions, axis=0), axis=1) > 1e-3 * radius])
     positions = positions[distinct]
     if len(positions) < 2:
-        return moved(sphere(radius), positions[0])
+        return place(sphere(radius), positions[0])
     tangents = np.gradient(positions, axis=0)
     across = np.empty_like(positions)
     side = along(tangents[0])[:, 0]
@@ -162,14 +162,14 @@ def grid(rows: int, columns: int) -> np.ndarray:
     return np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=2).reshape(-1, 3)
 
 
-def triangulated(faces: np.ndarray) -> np.ndarray:
+def triangulate(faces: np.ndarray) -> np.ndarray:
     """Return faces of three or four corners as triangles, shape (m, 3); bare points and lines give none."""
     if faces.shape[1] < 3:
         return np.empty((0, 3), dtype=int)
     return faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
-def shaded(points: np.ndarray, triangles: np.ndarray, *, sharp: bool = False) -> Surface:
+def with_normals(points: np.ndarray, triangles: np.ndarray, *, sharp: bool = False) -> Surface:
     """Add normals to points and triangles: averaged over each point's triangles, or of each triangle where `sharp`."""
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -188,14 +188,14 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return np.where(size > 0.0, vectors / np.where(size > 0.0, size, 1.0), np.array([0.0, 0.0, 1.0]))
 
 
-def _at(flat: np.ndarray, height: float) -> np.ndarray:
+def _points_at_height(flat: np.ndarray, height: float) -> np.ndarray:
     """Return points in the plane (..., 2) with their z."""
     return np.concatenate([flat, np.full((*flat.shape[:-1], 1), height)], axis=-1)
 
 
 def _cap(outline: np.ndarray, centre: np.ndarray, height: float, side: float) -> Surface:
     n = len(outline)
-    points = _at(np.vstack([outline, centre]), height)
+    points = _points_at_height(np.vstack([outline, centre]), height)
     ring = np.arange(n)
     order = [np.full(n, n), ring, np.roll(ring, -1)] if side > 0.0 else [np.full(n, n), np.roll(ring, -1), ring]
     return Surface(points, np.tile([0.0, 0.0, side], (n + 1, 1)), np.column_stack(order))

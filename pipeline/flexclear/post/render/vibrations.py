@@ -73,14 +73,14 @@ def vibrations(drawn: Mechanism, linear: xr.Dataset) -> Vibrations:
     pieces = []
     for part in drawn.parts:
         matrix = part_pose(run, part, 0)
-        drawn_part = surfaces.moved(part.surface, matrix[:3, 3], matrix[:3, :3])
+        drawn_part = surfaces.place(part.surface, matrix[:3, 3], matrix[:3, :3])
         moved = np.zeros((count, 2, *drawn_part.points.shape))
         if part.ends is not None:
-            moved = _stretched(run, linear, motions, part, drawn_part.points)
+            moved = _stretch_ends(run, linear, motions, part, drawn_part.points)
         elif part.owner is not None:
-            moved = _rigid(motions, part.owner, drawn_part.points, run["position"].values[0, part.owner])
+            moved = _rigid_displacements(motions, part.owner, drawn_part.points, run["position"].values[0, part.owner])
         pieces.append(Piece(drawn_part, moved, part.color, part.opacity, True))
-    pieces += [_bending(run, body, linear, motions) for body in drawn.flexible]
+    pieces += [_bending_piece(run, body, linear, motions) for body in drawn.flexible]
     sizes = [
         np.linalg.norm(piece.moved, axis=-1).reshape(count, -1).max(axis=1) for piece in pieces if piece.moved.size
     ]
@@ -130,14 +130,14 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
     return motions
 
 
-def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def _rigid_displacements(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Return displacements of points of a rigid body in each vibration, (vibration, part, point, 3)."""
     move, turn = motions[owner]
     return move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
 
 
-def _stretched(run: xr.Dataset, linear: xr.Dataset, motions: Motions, part: Part, points: np.ndarray) -> np.ndarray:
-    """Return displacements of points between two ends, which vary evenly from one end to the other; as of `_rigid`."""
+def _stretch_ends(run: xr.Dataset, linear: xr.Dataset, motions: Motions, part: Part, points: np.ndarray) -> np.ndarray:
+    """Return displacements of points between two ends, even from one to the other; as of `_rigid_displacements`."""
     assert part.ends is not None
     places = [site.position(run, 0) for site in part.ends]
     line = places[1] - places[0]
@@ -147,16 +147,18 @@ def _stretched(run: xr.Dataset, linear: xr.Dataset, motions: Motions, part: Part
         if site.frame is not None and not np.any(site.origin):  # its bending included
             moved += linear["frame_translation"].values[:, :, site.frame, None] * weight
         elif site.owner is not None:
-            moved += _rigid(motions, site.owner, place[None], run["position"].values[0, site.owner]) * weight
+            moved += (
+                _rigid_displacements(motions, site.owner, place[None], run["position"].values[0, site.owner]) * weight
+            )
     return moved
 
 
-def _bending(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions) -> Piece:
+def _bending_piece(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions) -> Piece:
     matrix = pose(run, body.index, 0)
     fields = linear_fields(body.bundle) @ matrix[:3, :3].T
     points = rest(body.bundle) @ matrix[:3, :3].T + matrix[:3, 3]
     shape = linear["modal_shape"].values[:, :, body.columns]
-    moved = _rigid(motions, body.index, points, matrix[:3, 3]) + np.tensordot(shape, fields, axes=1)
+    moved = _rigid_displacements(motions, body.index, points, matrix[:3, 3]) + np.tensordot(shape, fields, axes=1)
     return Piece(skin(body.bundle, points), moved, COLORS[0], 1.0, False)
 
 
@@ -213,7 +215,7 @@ def _stage(
             mesh["displacement"] = np.zeros(mesh.n_points)
             stage.add_mesh(mesh, scalars="displacement", cmap="viridis", clim=(0.0, 1.0), show_scalar_bar=False)
         skins.append(mesh)
-    film.look(stage, replace(drawn, cloud=_cloud(modes)))
+    film.place_camera(stage, replace(drawn, cloud=_cloud(modes)))
 
     def picture(vibration: int, phase: float) -> np.ndarray:
         scale, largest = modes.scale[vibration], modes.largest[vibration] or 1.0

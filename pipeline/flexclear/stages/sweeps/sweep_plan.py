@@ -155,7 +155,7 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     try:
         simulation.check_parts(simulation.params(base))
     except InputError as error:
-        raise lines.located(lines.placed(error, base.path)) from None
+        raise lines.with_line_number(lines.with_file_name(error, base.path)) from None
     recorded = tuple(_recorded(base, name, where) for name in sweep.keep)
     _check_recorded(sweep, base, sweep_design, recorded, where)
     _check_units(base, sweep_design, recorded, where)

@@ -25,7 +25,7 @@ import xarray as xr
 from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
 from flexclear.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
-from flexclear.structure.fe.model import DOFS, carried, rigid_motions, selection, symmetric
+from flexclear.structure.fe.model import DOFS, rigid_displacements, rigid_motions, selection, symmetric
 from flexclear.structure.fe.section import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
@@ -68,7 +68,7 @@ def assemble(mesh: xr.Dataset) -> Beam:
     to_fields = order @ _to_rod_axes(axes, mesh.sizes["node"], len(component))
     K = _in_vector_order(_form(kinematics, _strain_energy).assemble(basis, **stiffness(mesh)), to_fields)
     M = _in_vector_order(_form(kinematics, _kinetic_energy).assemble(basis, **_inertia(mesh)), to_fields)
-    mass = sp.csr_array(M + _lumped(mesh, len(component)))
+    mass = sp.csr_array(M + _lumped_mass(mesh, len(component)))
     return Beam(K, mass, kinematics, basis, to_fields, mesh["node_position"].values, axes, component, along)
 
 
@@ -181,11 +181,11 @@ def _to_rod_axes(axes: np.ndarray, nodes: int, size: int) -> sp.csr_array:
     return sp.csr_array(sp.block_diag([turn, sp.eye_array(size - N_DOFS * nodes)]))
 
 
-def _lumped(mesh: xr.Dataset, size: int) -> sp.csr_array:
+def _lumped_mass(mesh: xr.Dataset, size: int) -> sp.csr_array:
     """Return the mass matrix of lumped masses: with the offset r of the centre of mass, v = u + theta x r."""
     if "lump_node" not in mesh:
         return sp.csr_array((size, size))
-    motion, m = carried(mesh["lump_offset"].values), mesh["lump_mass"].values
+    motion, m = rigid_displacements(mesh["lump_offset"].values), mesh["lump_mass"].values
     blocks = m[:, None, None] * motion.transpose(0, 2, 1) @ motion
     blocks[:, 3:, 3:] += mesh["lump_inertia"].values
     nodes = selection(node_dofs(mesh["lump_node"].values), size)

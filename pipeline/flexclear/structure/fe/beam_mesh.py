@@ -133,16 +133,16 @@ def _section(recipe: BeamRecipe, part: Segment, s: np.ndarray) -> dict[str, np.n
     poisson = (part.material or recipe.material).poisson
     kappa = section_recipe.shear_coefficient(part.section, part.end_section, s, poisson) or (np.nan, np.nan)
     return {
-        "area": _each(s, stiffness.area),
-        "second_moment": _each(s, stiffness.torsion, stiffness.second_y, stiffness.second_z),
-        "product_moment": _each(s, stiffness.product),
-        "inertia_moment": _each(s, polar, about_y, about_z),
-        "inertia_product": _each(s, product),
-        "shear_coefficient": _each(s, 1.0, *kappa),
+        "area": _columns_at_points(s, stiffness.area),
+        "second_moment": _columns_at_points(s, stiffness.torsion, stiffness.second_y, stiffness.second_z),
+        "product_moment": _columns_at_points(s, stiffness.product),
+        "inertia_moment": _columns_at_points(s, polar, about_y, about_z),
+        "inertia_product": _columns_at_points(s, product),
+        "shear_coefficient": _columns_at_points(s, 1.0, *kappa),
     }
 
 
-def _each(s: np.ndarray, *values: Any) -> np.ndarray:
+def _columns_at_points(s: np.ndarray, *values: Any) -> np.ndarray:
     columns = np.stack([np.broadcast_to(np.asarray(value, dtype=float), s.shape) for value in values], axis=-1)
     return columns if len(values) > 1 else columns[:, 0]
 

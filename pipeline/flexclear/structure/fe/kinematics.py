@@ -53,7 +53,7 @@ class LocalHermite(Element):
         h = mapping.detDF(X, tind)  # (cells, points): the signed length of each cell
         scale = np.ones_like(h) if i % 2 == 0 else h
         s = np.broadcast_to(X[0], h.shape)
-        value, slope, curvature = (_at(HERMITE[i], s, order) for order in range(3))
+        value, slope, curvature = (_polynomial_at(HERMITE[i], s, order) for order in range(3))
         return (
             DiscreteField(
                 value=scale * value,
@@ -90,10 +90,10 @@ class Hierarchical(ElementH1):
 
     def lbasis(self, X: np.ndarray, i: int) -> tuple[Any, Any]:
         """Return function i and its derivative at local points X, shape (1, points)."""
-        return _at(BUBBLES[i], X[0]), _at(BUBBLES[i], X[0], 1)[None]
+        return _polynomial_at(BUBBLES[i], X[0]), _polynomial_at(BUBBLES[i], X[0], 1)[None]
 
 
-def _at(coefficients: np.ndarray, s: np.ndarray, order: int = 0) -> np.ndarray:
+def _polynomial_at(coefficients: np.ndarray, s: np.ndarray, order: int = 0) -> np.ndarray:
     return np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(coefficients, order))
 
 

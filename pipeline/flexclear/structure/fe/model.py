@@ -149,7 +149,7 @@ def interfaces(mesh: xr.Dataset, motion: Callable[[int], sp.csr_array]) -> tuple
     return tuple(Interface(str(name), x, R, motion(k)) for k, (name, x, R) in enumerate(rows))
 
 
-def grouped(groups: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def flatten_groups(groups: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Return the members of all groups, one after the other, and the group number of each."""
     members = [np.zeros(0, dtype=np.int64), *groups]
     return np.concatenate(members), np.repeat(np.arange(-1, len(members) - 1), [len(group) for group in members])
@@ -172,7 +172,7 @@ def node_motion(node: np.ndarray, component: np.ndarray, count: int) -> sp.csr_a
     return selection(own, len(node), 6 * node[own] + component[own], 6 * count)
 
 
-def carried(lever: np.ndarray) -> np.ndarray:
+def rigid_displacements(lever: np.ndarray) -> np.ndarray:
     """Return displacements of points per unit of a frame's six motions; lever: from frame to point [m], (..., 3)."""
     unit = np.broadcast_to(np.eye(3), (*lever.shape[:-1], 3, 3))
     return np.concatenate([unit, -skew(lever)], axis=-1)  # e x X = -X x e
@@ -186,7 +186,7 @@ def rigid_motions(positions: np.ndarray, component: np.ndarray, about: np.ndarra
     """
     motion = np.zeros((len(positions), 7, 6))
     motion[:, range(6), range(6)] = 1.0
-    motion[:, :3, :] = carried(positions - about)
+    motion[:, :3, :] = rigid_displacements(positions - about)
     return motion[np.arange(len(positions)), np.minimum(component, 6)]
 
 

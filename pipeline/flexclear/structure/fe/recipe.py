@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from flexclear.scene.fields import Part
-from flexclear.scene.json_schema import identified
+from flexclear.scene.json_schema import with_identity
 from flexclear.scene.load import RECIPE, require_kind
 from flexclear.scene.registry import suggestion
 from flexclear.scene.toml_files import read_toml
@@ -133,4 +133,4 @@ def recipe_schema() -> dict[str, Any]:
     ]
     shape = {"type": "object", "required": ["type"], "properties": {"type": {"enum": list(MODELS)}}}
     whole = {"title": "Recipe", "type": "object", "required": ["shape"], "properties": {"shape": shape}}
-    return identified({**whole, "allOf": chosen, **schema}, "recipe")
+    return with_identity({**whole, "allOf": chosen, **schema}, "recipe")

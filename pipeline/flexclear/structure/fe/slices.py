@@ -33,7 +33,7 @@ import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.structure.fe.beam import Beam, at_points, node_dofs, per_point
-from flexclear.structure.fe.model import Integrals, carried, selection
+from flexclear.structure.fe.model import Integrals, rigid_displacements, selection
 
 VALUES = ("mass", "position", "spread", "rigid_spread", "offset")
 
@@ -189,5 +189,5 @@ def _lumps(mesh: xr.Dataset, size: int) -> Slices:
 def at_centres(nodes: sp.csr_array, r: np.ndarray) -> sp.csr_array:
     """Return the motion of centres at r [m], (p, 3), from the nodes, s = u + theta x r; motions: (6 p, ndof)."""
     lever = np.tile(np.eye(6), (len(r), 1, 1))
-    lever[:, :3] = carried(r)
+    lever[:, :3] = rigid_displacements(r)
     return sp.csr_array(sp.block_diag(list(lever)) @ nodes)

@@ -84,17 +84,17 @@ def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, fir
         if square == 0.0:
             # at rest an unbalanced load has no equilibrium; the inertia of the free body balances it
             residual = flexibility.balanced(loads)
-            residual = residual - K[:, 6:] @ _solved(vectors.T @ K[:, 6:], vectors.T @ residual)
+            residual = residual - K[:, 6:] @ _solve(vectors.T @ K[:, 6:], vectors.T @ residual)
         else:
             inner = basis.T @ (K - square * M)
-            residual = loads - (K - square * M) @ _solved(inner, basis.T @ loads)
+            residual = loads - (K - square * M) @ _solve(inner, basis.T @ loads)
         energy = np.einsum("ij,ij->j", residual, flexibility.response(flexibility.balanced(residual)))
         result[:, k] = energy / (1.0 - (value / first) ** 2)
     # rounding may give negative values where a basis misses nothing
     return np.maximum(result, 0.0).reshape(len(model.interfaces), 6, len(hertz))
 
 
-def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     scale = 1.0 / np.sqrt(np.abs(np.diag(matrix)))
     return scale[:, None] * scipy.linalg.solve(scale[:, None] * matrix * scale, scale[:, None] * right)
 

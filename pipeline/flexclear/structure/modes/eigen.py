@@ -25,7 +25,7 @@ EQUAL = 1e-6
 RIGID_GAP = 1e4
 
 
-def dense(stiffness: sp.csr_array, mass: sp.csr_array, count: int) -> tuple[np.ndarray, np.ndarray]:
+def dense_eigenpairs(stiffness: sp.csr_array, mass: sp.csr_array, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the `count` lowest eigenvalues [rad^2/s^2], ascending, and mass-normalised vectors, shape (n, count).
 
     Raises InputError when the mass matrix is not positive definite.
@@ -37,7 +37,7 @@ def dense(stiffness: sp.csr_array, mass: sp.csr_array, count: int) -> tuple[np.n
     return values[:count], vectors[:, :count]
 
 
-def inverted(
+def lanczos_eigenpairs(
     stiffness: sp.csr_array,
     mass: sp.csr_array,
     count: int,
@@ -151,7 +151,7 @@ def family(model: Model, vectors: np.ndarray) -> list[str]:
     return [families.names[k] for k in first_largest(totals, axis=0)]
 
 
-def signed(model: Model, vectors: np.ndarray, families: list[str]) -> np.ndarray:
+def fix_signs(model: Model, vectors: np.ndarray, families: list[str]) -> np.ndarray:
     """Return each vector with its largest displacement (for torsion, rotation) positive.
 
     Of equally large components, as at the two ends of an antisymmetric shape, the first counts.

@@ -53,12 +53,12 @@ def lowest(
             most = size // 4
             raise InputError(WHERE, f"{count} modes of {size} coordinates are too many", f"request at most {most}")
         return _dense_held(model, held, count) if held.shape[0] else _dense_free(model, count)
-    return _sparse(model, held, count, flexibility(), progress, rough=rough)
+    return _sparse_modes(model, held, count, flexibility(), progress, rough=rough)
 
 
 def _dense_free(model: Model, count: int) -> Normal:
     n = model.rigid.shape[1]
-    values, shapes = eigen.dense(model.stiffness, model.mass, n + min(count + 1, model.size - n))
+    values, shapes = eigen.dense_eigenpairs(model.stiffness, model.mass, n + min(count + 1, model.size - n))
     if len(values) > n:
         eigen.without_rigid(values, n)
     elastic = shapes[:, n : n + count]
@@ -73,15 +73,15 @@ def _dense_held(model: Model, held: sp.csr_array, count: int) -> Normal:
     dofs = own_dofs(held)
     if dofs is not None:
         free = np.setdiff1d(np.arange(model.size), dofs)
-        values, shapes[free] = eigen.dense(model.stiffness[free][:, free], model.mass[free][:, free], count)
+        values, shapes[free] = eigen.dense_eigenpairs(model.stiffness[free][:, free], model.mass[free][:, free], count)
         return Normal(values, shapes, NOBODY)
     space = scipy.linalg.null_space(held.toarray())
     K, M = (space.T @ (matrix @ space) for matrix in (model.stiffness, model.mass))
-    values, mixed = eigen.dense(sp.csr_array(0.5 * (K + K.T)), sp.csr_array(0.5 * (M + M.T)), count)
+    values, mixed = eigen.dense_eigenpairs(sp.csr_array(0.5 * (K + K.T)), sp.csr_array(0.5 * (M + M.T)), count)
     return Normal(values, space @ mixed, NOBODY)
 
 
-def _sparse(
+def _sparse_modes(
     model: Model, held: sp.csr_array, count: int, flexibility: Flexibility, progress: Progress, *, rough: bool
 ) -> Normal:
     if held.shape[0]:
@@ -96,7 +96,7 @@ def _sparse(
         return inverse(loads.reshape(-1, 1)).ravel()
 
     # 1e-6: relative residual of a rough eigenvalue; the error of the frequency is at most its square
-    values, shapes = eigen.inverted(model.stiffness, model.mass, count, compliance, 1e-6 if rough else 0.0)
+    values, shapes = eigen.lanczos_eigenpairs(model.stiffness, model.mass, count, compliance, 1e-6 if rough else 0.0)
     # ARPACK leaves a trace of the held motions in the shapes; one more step of the iteration removes it
     shapes = inverse(model.mass @ shapes) * values
     rigid = NOBODY

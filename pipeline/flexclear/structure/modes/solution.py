@@ -63,7 +63,7 @@ def solve(
     values, vectors = eigen.rediagonalise(model.stiffness, model.mass, shapes)
     vectors = eigen.orient(model, values, vectors)
     families = eigen.family(model, vectors)
-    vectors = eigen.signed(model, vectors, families)
+    vectors = eigen.fix_signs(model, vectors, families)
     data = _variables(model, values, vectors)
     data["kind"] = (("mode",), np.array(kind.words(model, families, vectors)))
     exact = kind.exact(mesh, reference, families, names) if kind.exact is not None else {}

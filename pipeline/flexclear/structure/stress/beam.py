@@ -93,15 +93,18 @@ def _slices(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarray
         "slice_spread": (("slice", "axis", "axis2"), body.spread),
         "slice_translation_shape": (shape, moved[:, :3]),
         "slice_rotation_shape": (shape, moved[:, 3:]),
-        "slice_beyond": (("section", "slice"), np.hstack([inside, _beyond(lumps, positions, ending)]).astype(np.int8)),
+        "slice_beyond": (
+            ("section", "slice"),
+            np.hstack([inside, _lies_beyond(lumps, positions, ending)]).astype(np.int8),
+        ),
         "frame_beyond": (
             ("section", "frame"),
-            _beyond(x[mesh["frame_node"].values], positions, ending).astype(np.int8),
+            _lies_beyond(x[mesh["frame_node"].values], positions, ending).astype(np.int8),
         ),
     }
 
 
-def _beyond(points: np.ndarray, positions: np.ndarray, ending: np.ndarray) -> np.ndarray:
+def _lies_beyond(points: np.ndarray, positions: np.ndarray, ending: np.ndarray) -> np.ndarray:
     """Return True where nodes at `points` lie beyond each section; a cell's end node lies beyond its end section."""
     ahead = points[None, :] - positions[:, None]
     return (ahead > 0.0) | (ending[:, None] & (ahead == 0.0))
@@ -111,7 +114,7 @@ def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
     outlines: list[Outline] = []
     types = tuple(mesh.attrs["section"].split())
     poisson = 0.5 * mesh["youngs_modulus"].values / mesh["shear_modulus"].values - 1.0
-    area, second = (_at_ends(mesh, name) for name in CONSTANTS)
+    area, second = (_constants_at_ends(mesh, name) for name in CONSTANTS)
     product = mesh["product_moment"].values if "product_moment" in mesh else np.zeros(mesh.sizes["cell"])
     for cell in range(mesh.sizes["cell"]):
         for end in (0, 1):
@@ -130,7 +133,7 @@ def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _at_ends(mesh: xr.Dataset, name: str) -> np.ndarray:
+def _constants_at_ends(mesh: xr.Dataset, name: str) -> np.ndarray:
     """Return a section constant at both ends of each cell, shape (cells, 2) or (cells, 2, 3)."""
     values = beams.at_points(mesh, name)
     if f"{name}_profile" not in mesh:

@@ -26,10 +26,10 @@ import xarray as xr
 
 from flexclear.artifacts.coordinates import AXES
 from flexclear.scene.registry import suggestion
-from flexclear.structure.fe.model import DIRECTIONS, Model, grouped, rows
+from flexclear.structure.fe.model import DIRECTIONS, Model, flatten_groups, rows
 from flexclear.structure.fe.solid import elasticity
 from flexclear.structure.fe.solid.elasticity import Solid
-from flexclear.structure.fe.solid.elements import ELEMENTS, from_stress_points, sampled
+from flexclear.structure.fe.solid.elements import ELEMENTS, from_stress_points, sample_element
 from flexclear.structure.fe.solid.model import assemble, solid_of, surface, unknowns_of
 from flexclear.structure.fe.statics import support
 from flexclear.system.errors import InputError
@@ -60,12 +60,12 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[st
     vectors, omega = modes["vector"].values, 2.0 * np.pi * modes["frequency"].values
     inertia = _inertia(elasticity.mass(solid), solid.nodes, unknowns.spread)
     loads = np.hstack([rows(model.interfaces, model.size).T.toarray(), inertia, -(model.mass @ vectors)])
-    fields = unknowns.spread @ np.hstack([vectors, _lacking(model, vectors, omega, loads)])
+    fields = unknowns.spread @ np.hstack([vectors, _missing_response(model, vectors, omega, loads)])
     names = [f"mode {k + 1}" for k in range(len(omega))]
     names += [f"{frame.name} {direction}" for frame in model.interfaces for direction in DIRECTIONS]
     names += [f"acceleration {k}" for k in AXES] + [f"acceleration {k} per {x}" for k in AXES for x in AXES]
     names += [f"acceleration of mode {k + 1}" for k in range(len(omega))]
-    entries, gauge = grouped(places.values())
+    entries, gauge = flatten_groups(places.values())
     return {
         "stress_field": (("node", "tensor", "field"), at_nodes(solid, shown, fields)),
         "field": (("field",), names),
@@ -78,7 +78,7 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[st
 
 def at_nodes(solid: Solid, nodes: np.ndarray, fields: np.ndarray) -> np.ndarray:
     """Return the stress of displacement fields (3 n, f) at some nodes, shape (nodes, 6, f) [Pa per unit of field]."""
-    at = sampled(solid.element, ELEMENTS[solid.element].stress_order)
+    at = sample_element(solid.element, ELEMENTS[solid.element].stress_order)
     outward, f = from_stress_points(solid.element), fields.shape[1]
     moved = fields.reshape(-1, 3, f)
     number = np.full(len(solid.nodes), -1)
@@ -117,7 +117,7 @@ def _inertia(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array) -> np.
     return np.hstack([loads[:, :, 0], loads[:, :, 1:].reshape(-1, 9)])
 
 
-def _lacking(model: Model, vectors: np.ndarray, omega: np.ndarray, loads: np.ndarray) -> np.ndarray:
+def _missing_response(model: Model, vectors: np.ndarray, omega: np.ndarray, loads: np.ndarray) -> np.ndarray:
     """Return the part of the response to each balanced load that the shapes lack, up to rigid motion, (ndof, loads)."""
     flexibility = support(model, lambda _: None)
     balanced = flexibility.balanced(loads)

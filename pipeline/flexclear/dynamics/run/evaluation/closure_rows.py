@@ -75,7 +75,7 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
     return better
 
 
-def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
+def scale_rows(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
     """Return closure Jacobians (..., selected rows, nv), lengths in units of `SCALE`, for reported conditions."""
     return J * np.outer(1.0 / row_units(model, h, SCALE), coordinate_scales(model.numbering))
 
@@ -105,7 +105,7 @@ def diagnosis(engine: Engine) -> str:
     """Return the condition number at the state evaluated last, and the joint whose closure is nearest to dependent."""
     if not engine.model.closures:
         return "no loop is closed"
-    J = scaled(engine.model, engine.h, engine.rows(m.JACOBIAN))
+    J = scale_rows(engine.model, engine.h, engine.rows(m.JACOBIAN))
     if not J.size:
         return "the closures constrain no free coordinate of the tree"
     if not np.isfinite(J).all():

@@ -264,7 +264,7 @@ class Engine:
 
     def rows(self, stored: int) -> np.ndarray:
         """Return JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
-        return selection.dense(self.model, self.h, self.view(stored))
+        return selection.dense_rows(self.model, self.h, self.view(stored))
 
 
 def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[Any, ...]:

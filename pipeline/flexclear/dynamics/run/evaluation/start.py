@@ -29,7 +29,7 @@ def consistent_start(engine: Engine) -> np.ndarray:
     Raises InputError for a start that joints, drives or surfaces do not allow.
     """
     y = closed_start(engine)
-    model, depths = engine.model, overlapping(engine, y).items()
+    model, depths = engine.model, overlap_depths(engine, y).items()
     together(partial(refuse_depth, model.scene, model.contacts[c], depth) for c, depth in depths)
     return y
 
@@ -41,14 +41,14 @@ def closed_start(engine: Engine) -> np.ndarray:
     y = initial.start_state(model)
     closure_rows.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:
-        y = _closed(engine, y)
+        y = _close_loops(engine, y)
     # a singular pose has no rates to project on
     fraction = 0.0 if engine.mobility.singular_start else initial.WRONG
     y = initial.given_velocities(model, start_motions(engine), y, fraction)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.loads or model.arrays.size(m.N_INTERNAL):
-        _look(engine, y)
+        _evaluate_kinematics(engine, y)
         y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
     return recorded_states(model, y)
 
@@ -57,7 +57,7 @@ def start_motions(engine: Engine) -> initial.Motions:
     """Return the effect of speeds at the start: motions of the links, and rates at which the loops open."""
 
     def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        _look(engine, state)
+        _evaluate_kinematics(engine, state)
         return engine.table(m.LINK_FRAMES), engine.table(m.SITE_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
 
     return motion
@@ -65,7 +65,7 @@ def start_motions(engine: Engine) -> initial.Motions:
 
 def mends(engine: Engine, y: np.ndarray) -> list[str]:
     """Return sentences about the differences of a consistent start y from the scene's poses and velocities."""
-    _look(engine, y)
+    _evaluate_kinematics(engine, y)
     frames = engine.table(m.LINK_FRAMES)
     now = [Placement(frame["origin"], frame["axes"]) for frame in frames]
     model = engine.model
@@ -74,7 +74,7 @@ def mends(engine: Engine, y: np.ndarray) -> list[str]:
     return [*corrected_starts(model.mechanism, now), *bent, *speeds]
 
 
-def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
+def _close_loops(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Apply `project` to a start that only the engine can close: with paths, or with flexible bodies."""
     try:
         return project(engine, y)
@@ -85,7 +85,7 @@ def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
         raise InputError(path, f"the mechanism cannot be assembled: {error}", what) from None
 
 
-def _look(engine: Engine, y: np.ndarray) -> None:
+def _evaluate_kinematics(engine: Engine, y: np.ndarray) -> None:
     """Evaluate the kinematics at the start; a singular pose has no unique accelerations."""
     if engine.mobility.singular_start:
         engine.attempt(y, engine.start)
@@ -120,7 +120,7 @@ def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.nda
     return np.moveaxis(np.reshape(changes, (nv, *np.shape(driven))), 0, -1)
 
 
-def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
+def overlap_depths(engine: Engine, y: np.ndarray) -> dict[int, float]:
     """Return the contacts whose surfaces overlap at the start, by index, and their depths [m]."""
     if not engine.model.contacts:
         return {}

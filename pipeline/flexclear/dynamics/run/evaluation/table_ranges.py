@@ -9,7 +9,7 @@ from flexclear.dynamics.compile.formulas import looked_up
 from flexclear.dynamics.loads import looks
 from flexclear.dynamics.loads.lookup import ROUNDING
 from flexclear.scene.expression import Lookup
-from flexclear.scene.formulas import formula, written
+from flexclear.scene.formulas import expressions_of_load, formula
 
 
 def explanation(engine: Any) -> str | None:
@@ -22,7 +22,12 @@ def explanation(engine: Any) -> str | None:
             continue
         scope: dict[str, Any] = {"looks": looks}
         exec(looked_up(known.code), scope)
-        units = {step.name: step.of for _, steps in written(scene, load) for step in steps if isinstance(step, Lookup)}
+        units = {
+            step.name: step.of
+            for _, steps in expressions_of_load(scene, load)
+            for step in steps
+            if isinstance(step, Lookup)
+        }
         for number, values in scope["looked_up"](d, k):
             called, table = list(load.tables.items())[number]
             for column, unit, axis, value in zip(table.of, units[called], table.axes(), values, strict=True):

@@ -34,7 +34,7 @@ from flexclear.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.dynamics.run.evaluation.engine import Engine, another
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import per_speed, project, rates_at_speeds
-from flexclear.dynamics.run.trajectory import Followed, Stop, asked
+from flexclear.dynamics.run.trajectory import Followed, Stop, stop_requested
 from flexclear.system.errors import SolverError
 from flexclear.system.progress import Progress
 from flexclear.workflow.cores import TICK
@@ -72,7 +72,7 @@ class Pair:
 
     def __init__(self, engine: Engine) -> None:
         requested = engine.output_times(engine.model.scene.output.interval)
-        self.added = _between(engine, requested)
+        self.added = _times_between(engine, requested)
         self.outputs = np.union1d(requested, self.added)
         self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
         self._engine, self._observer = another(engine), another(engine)
@@ -126,7 +126,7 @@ class Pair:
     def store_rows(self, rows: np.ndarray) -> bool:
         """Store the rows that the run has so far; return True on a request to stop."""
         self._run.rows = rows
-        return asked(rows)
+        return stop_requested(rows)
 
     def _enough(self, other: _Side, alive: Progress) -> bool:
         """Return True when the two have diverged, so that the horizon is known.
@@ -256,7 +256,7 @@ class Metric:
         return np.asarray((self.norms(one - other)[:, scale > 0.0] / scale[scale > 0.0]).max(axis=1, initial=0.0))
 
 
-def _between(engine: Engine, requested: np.ndarray) -> np.ndarray:
+def _times_between(engine: Engine, requested: np.ndarray) -> np.ndarray:
     """Return times [s] of comparison between outputs that are too rare.
 
     Motions diverge at impacts: with one output per stroke, the divergence would be detected one stroke late.
@@ -288,7 +288,7 @@ def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     return per_speed(engine, y, offset_rates)
 
 
-def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+def perturbed_start(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """Return the start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
     engine.select_pieces_after(engine.start)
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
@@ -301,7 +301,7 @@ def moved_start(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Return the start of a perturbed run: every contact moved by PERTURBATION of its clearance, along no axis."""
     along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
     offsets = np.outer(PERTURBATION * engine.model.arrays.table(m.CONTACT_NUMBERS)["clearance"], along)
-    return perturbed(engine, y, offset_jacobian(engine, y), offsets.ravel())
+    return perturbed_start(engine, y, offset_jacobian(engine, y), offsets.ravel())
 
 
 def asymmetric(count: int) -> np.ndarray:

@@ -76,7 +76,7 @@ class Period:
     after: Cursor
 
 
-def stretches(engine: Engine, period: float, phase: float) -> list[Engine]:
+def parts_of_period(engine: Engine, period: float, phase: float) -> list[Engine]:
     """Return the engine for each stretch between waypoints of a period, one at `phase`; all share the work space."""
     regular = period * np.linspace(0.0, 1.0, WAYPOINTS + 1)
     # the phase replaces a regular waypoint next to it
@@ -101,10 +101,10 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
         if number not in followed:
             neighbour = None
         for part in parts:
-            trajectory, there = _integrated(part, y, here)
+            trajectory, there = _integrate_part(part, y, here)
             if neighbour is not None:
                 after = _follow(part, neighbour)
-                neighbour, grown = rescaled(part, scales, there, after, separation)
+                neighbour, grown = rescale_neighbour(part, scales, there, after, separation)
                 growth, lost = growth + grown[0], lost + grown[1]
             elif number in followed:
                 neighbour = _set_neighbour(part, scales, there, separation)
@@ -123,7 +123,7 @@ def state_scales(engine: Engine, period: float) -> np.ndarray:
     return floors
 
 
-def _integrated(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, Moment]:
+def _integrate_part(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, Moment]:
     """Integrate over one stretch, from the run's start where no moment exists; return the trajectory and its end."""
     left = None if here is None else handover(part, here)
     trajectory = integrate(part, y, silent, left=left)
@@ -133,7 +133,7 @@ def _integrated(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Traje
 def _follow(part: Engine, here: Moment) -> Moment | None:
     """Return the neighbour at the end of a stretch; None where it cannot be followed."""
     try:
-        return _integrated(part, here.y, here)[1]
+        return _integrate_part(part, here.y, here)[1]
     except SolverError:
         return None
 
@@ -176,10 +176,10 @@ def _set_neighbour(part: Engine, scales: np.ndarray, here: Moment, separation: f
     direction = np.where(np.isfinite(scales), asymmetric(len(scales)), 0.0)
     unit = direction / np.linalg.norm(direction)
     moved = here.y + separation * unit * np.where(np.isfinite(scales), scales, 0.0)
-    return replace(here, y=_closed(part, moved))
+    return replace(here, y=_state_with_closed_loops(part, moved))
 
 
-def rescaled(
+def rescale_neighbour(
     part: Engine, scales: np.ndarray, here: Moment, neighbour: Moment | None, separation: float
 ) -> tuple[Moment, tuple[float, int]]:
     """Return the neighbour at its distance again, the logarithm of its growth, and 1 if it failed or was not linear.
@@ -196,12 +196,12 @@ def rescaled(
     if distance == 0.0:
         return _set_neighbour(part, scales, here, separation), (0.0, 1)
     fraction = separation / distance
-    y = _closed(part, here.y + fraction * difference)
+    y = _state_with_closed_loops(part, here.y + fraction * difference)
     latched = here.latched + fraction * (neighbour.latched - here.latched)
     # 1e4: growth of the distance between two waypoints above which it is not linear, which is reported
     return replace(neighbour, y=y, latched=latched), (-float(np.log(fraction)), int(distance > 1e4 * separation))
 
 
-def _closed(part: Engine, y: np.ndarray) -> np.ndarray:
+def _state_with_closed_loops(part: Engine, y: np.ndarray) -> np.ndarray:
     """Return the state at the end of a stretch, with closed loops."""
     return project(replace(part, start=part.end), y)

@@ -10,10 +10,10 @@ import numpy as np
 
 from flexclear.artifacts.quantities import combined
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model.driving import coordinate_of, label, prescribed
+from flexclear.dynamics.model.driving import coordinate_of, label, prescribed_coordinates
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.scene.expression import Lookup
-from flexclear.scene.formulas import written
+from flexclear.scene.formulas import expressions_of_load
 from flexclear.scene.loads import EXPRESSIONS
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import InputError
@@ -31,7 +31,7 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
     difference. Expressions of loads have the same values a period later, whatever the motion.
     """
     model, period = parts[0].model, parts[-1].end - parts[0].start
-    scene, driven, values = model.scene, prescribed(model.scene), []
+    scene, driven, values = model.scene, prescribed_coordinates(model.scene), []
     for part, t in ((parts[0], parts[0].start), (parts[-1], parts[-1].end)):
         part.select_pieces_after(t)
         part.attempt(y, t)
@@ -39,7 +39,10 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
         values.append(np.stack([laws["value"], laws["rate"]], axis=1))
     change, first = values[1] - values[0], {name: int(row["law0"]) for name, row in model.rows_of(object).items()}
     grown = dict(zip((one.name for one in driven), change[:, 0].tolist(), strict=False))
-    formulas = {name: [steps for _, steps in written(scene, scene.load[name])] for name in model.rows_of(*EXPRESSIONS)}
+    formulas = {
+        name: [steps for _, steps in expressions_of_load(scene, scene.load[name])]
+        for name in model.rows_of(*EXPRESSIONS)
+    }
     timed = {name for name, texts in formulas.items() for steps in texts if any(_is_time(step) for step in steps)}
     for name, texts in formulas.items():
         change[first[name]] = 0.0  # the time itself, which its expression reads

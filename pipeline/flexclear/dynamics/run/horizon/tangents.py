@@ -104,8 +104,8 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
         raise SolverError("derivatives do not support sampled controllers: use a continuous 'pid'")
     if engine.method.traits.implicit:
         raise SolverError("derivatives need an explicit method: choose 'dop853'")
-    wide = _widened(model.arrays, model.arrays.f, count)
-    changes = [_widened(model.arrays, direction.numbers, count).f for direction in directions]
+    wide = _with_room_for_changes(model.arrays, model.arrays.f, count)
+    changes = [_with_room_for_changes(model.arrays, direction.numbers, count).f for direction in directions]
     wide = replace(wide, f=np.concatenate([wide.f, *changes]))
     made = assemble(
         replace(model, arrays=wide, ny=(1 + count) * model.ny), engine.entry, engine.method, engine.mobility
@@ -116,21 +116,21 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
     return made
 
 
-def _widened(arrays: Arrays, f: np.ndarray, count: int) -> Arrays:
+def _with_room_for_changes(arrays: Arrays, f: np.ndarray, count: int) -> Arrays:
     """Return arrays with numbers f whose state has room for changes, in error groups of their own."""
     given = Arrays(arrays.h, f, arrays.columns)
     tables = {table: given.rows(table) for table in (*m.TABLES["h"], *m.TABLES["f"])}
     groups, floors = tables[m.GROUPS], tables[m.FLOORS]
     tables[m.GROUPS] = np.concatenate([groups + k * len(floors) for k in range(1 + count)])
     coarser = floors.copy()
-    coarser[np.unique(groups[_accumulated(arrays)]), :2] *= COARSER
+    coarser[np.unique(groups[_accumulated_variables(arrays)]), :2] *= COARSER
     coarser[:, 2] *= LOOSER
     tables[m.FLOORS] = np.concatenate([floors, *[coarser] * count])
     own = (m.NY, m.N_GROUPS)
     return pack({k: arrays.size(k) for k in range(m.ADDRESSES[0]) if k not in own}, tables, arrays.columns)
 
 
-def _accumulated(arrays: Arrays) -> np.ndarray:
+def _accumulated_variables(arrays: Arrays) -> np.ndarray:
     """Return True for each state variable that is an accumulated one of the ledger, on which no rate depends, (NY,)."""
     first, end = arrays.size(m.NQ) + arrays.size(m.NV), arrays.size(m.NY) - arrays.size(m.N_INTERNAL)
     summed = (np.arange(arrays.size(m.NY)) >= first) & (np.arange(arrays.size(m.NY)) < end)

@@ -21,7 +21,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.progress_rate import Judge, Judges, Look, Panel, limited, pace
+from flexclear.dynamics.run.progress_rate import Judge, Judges, Look, Panel, limited_by_stability, pace
 from flexclear.dynamics.run.refusals import refusal
 from flexclear.dynamics.run.run import engine_of
 from flexclear.scene.integrators import DEFAULT, STIFF, VIBRATING, by_need
@@ -217,7 +217,7 @@ class Costs:
         tried = name == STIFF and STIFF not in self.seen and heir in self.seen
 
         def verdict(engine: Engine, looks: Sequence[Look]) -> str:
-            if engine.model.scene.solver.integrator == DEFAULT and not limited(looks):
+            if engine.model.scene.solver.integrator == DEFAULT and not limited_by_stability(looks):
                 return ""
             # a method that handed over in this run took more than predicted
             enough = max(most, RELATIVE_COST[heir] * self.expected.get(heir, 0.0)) / RELATIVE_COST[name]

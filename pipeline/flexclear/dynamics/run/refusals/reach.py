@@ -37,7 +37,7 @@ OPTIONS: Any = {"eps": 1e-6}
 
 
 @contextmanager
-def preserved(engine: Engine) -> Iterator[None]:
+def restore_work_array(engine: Engine) -> Iterator[None]:
     """Restore the work array afterwards."""
     saved = engine.w.copy(), engine.n.copy()
     try:
@@ -56,7 +56,7 @@ def beyond_reach(engine: Engine) -> str:
     model = engine.model
     if not model.drives or not model.closures or not model.mechanism.all_rigid:
         return ""
-    with preserved(engine):
+    with restore_work_array(engine):
         return _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
 
 
@@ -69,9 +69,9 @@ def require_shallow(engine: Engine) -> None:
     from flexclear.dynamics.contact.validity import SHALLOW, pressed_through
 
     model, t = engine.model, float(engine.control[m.TIME])
-    with preserved(engine):
+    with restore_work_array(engine):
         engine.attempt(engine.view(m.Y).copy(), t)
-        depths, drive = -engine.table(m.TOUCH)["gap"], _pulling(engine)
+        depths, drive = -engine.table(m.TOUCH)["gap"], _strongest_drive(engine)
     pulled = drive is not None
     away = f"drive {drive} leads out of reach: {_shorten(drive or '')}"
     for k, (contact, depth) in enumerate(zip(model.contacts, depths, strict=True)):
@@ -81,7 +81,7 @@ def require_shallow(engine: Engine) -> None:
         shallow = SHALLOW * contact.joint.radius
         if not (pulled and model.mechanism.all_rigid and depth > shallow > 0.0):
             continue
-        with preserved(engine):
+        with restore_work_array(engine):
             time, least = forced_depth(engine, k, shallow)
         if least:
             raise SolverError(
@@ -97,7 +97,7 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
     rows: the record so far, for comparison with the speeds at the stepper's state.
     """
     model, t, y = engine.model, float(engine.control[m.TIME]), engine.view(m.Y).copy()
-    with preserved(engine):
+    with restore_work_array(engine):
         engine.attempt(y, t)
         J = closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN))
         where = closure_rows.diagnosis(engine) if J.size else ""
@@ -109,10 +109,10 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
     before, now = (np.abs(s[..., model.speeds] / model.speed_scales)[..., moving] for s in (states, y))
     if np.max(now, initial=0.0) > DYING * np.max(before, initial=0.0):
         return _too_fast(engine, t, where)
-    return rest(t, where)
+    return describe_rest(t, where)
 
 
-def rest(t: float, where: str) -> str:
+def describe_rest(t: float, where: str) -> str:
     """Describe a rest in a singular pose."""
     return (
         f"at t = {t:.6g} s: the mechanism comes to rest in a singular pose ({where}), where it can continue in several "
@@ -143,7 +143,7 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
 def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     model, still = engine.model, y.copy()
     engine.attempt(y, t)
-    drive = _pulling(engine) or model.drives[0]
+    drive = _strongest_drive(engine) or model.drives[0]
     still[model.speeds] = 0.0
     engine.attempt(still, t)
     U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN)))
@@ -161,7 +161,7 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     )
 
 
-def _pulling(engine: Engine) -> str | None:
+def _strongest_drive(engine: Engine) -> str | None:
     """Return the drive with the largest power in the state evaluated last; None when no drive has power."""
     powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[engine.model.nv :])
     return engine.model.drives[int(np.argmax(powers))] if np.any(powers > 0.0) else None

@@ -17,7 +17,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.refusals.reach import preserved
+from flexclear.dynamics.run.refusals.reach import restore_work_array
 
 #: displacement of a point in its body frame, as fraction of the body's length, above which a warning follows
 BENT = 0.05
@@ -95,7 +95,7 @@ def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
 
 def doubts(engine: Engine) -> list[str]:
     """Return such warnings about the state at the end of the last step; the engine is not changed."""
-    with preserved(engine):
+    with restore_work_array(engine):
         # the last evaluation may be of a step that was rejected, at speeds that the motion never had
         engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
         coordinates, frames = engine.view(m.Y)[None, : engine.model.nq], engine.table(m.LINK_FRAMES)[None]
@@ -113,20 +113,20 @@ def _worst(model: Model, time: np.ndarray, coordinates: np.ndarray, frames: np.n
     found: dict[tuple[str, str], tuple[float, str]] = {}
     rod_of = {piece: rod for rod, pieces in model.scene.rods().items() for piece in pieces}
     for body in flexibles(model):
-        for kind, excess, text in _judged(body, time, coordinates, frames):
+        for kind, excess, text in _warnings_of_body(body, time, coordinates, frames):
             key = rod_of[body.name], kind
             found[key] = max(found.get(key, (0.0, "")), (excess, text))
     return [text for _, text in found.values()]
 
 
-def _judged(
+def _warnings_of_body(
     body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray
 ) -> Iterator[tuple[str, float, str]]:
     """Yield kind, excess over the limit and text of each warning about one body."""
     yield from (("speed", 1.0, text) for text in _spun(body, time, frames[:, body.link]))
     q = coordinates[:, body.coordinates]
     if body.length > 0.0:
-        row, bent = largest(body.shapes, q, BENT * body.length)
+        row, bent = largest_displacement(body.shapes, q, BENT * body.length)
         if bent > BENT * body.length:
             excess = bent / body.length / BENT
             text = (
@@ -134,7 +134,7 @@ def _judged(
                 f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: " + body.remedy(excess)
             )
             yield "displacement", excess, text
-    row, turned = largest(body.rotations, q, SECTION_ROTATION)
+    row, turned = largest_displacement(body.rotations, q, SECTION_ROTATION)
     if turned > SECTION_ROTATION:
         excess = turned / SECTION_ROTATION
         text = (
@@ -174,7 +174,7 @@ def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
         )
 
 
-def largest(shapes: np.ndarray, q: np.ndarray, floor: float) -> tuple[int, float]:
+def largest_displacement(shapes: np.ndarray, q: np.ndarray, floor: float) -> tuple[int, float]:
     """Return row and size of the largest displacement or rotation of any node, among rows that can exceed `floor`.
 
     shapes: (node, axis, mode).  q: modal coordinates, (rows, mode).

@@ -25,7 +25,7 @@ from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import start_motions
-from flexclear.dynamics.run.refusals.reach import preserved
+from flexclear.dynamics.run.refusals.reach import restore_work_array
 from flexclear.dynamics.run.singular_poses.collocation import Collocation, Lead, Sampler, collocate
 from flexclear.scene.start import Branch
 from flexclear.system.errors import InputError, SolverError
@@ -50,7 +50,7 @@ def start_motion(engine: Engine, y: np.ndarray) -> Collocation:
         motions, turn = [by_speeds(engine, y)], 1e-6
     else:
         # 0.5: computed directions have an error of some hundredths
-        motions, turn = _chosen(engine, directions(engine, y), choices), 0.5
+        motions, turn = _matching_directions(engine, directions(engine, y), choices), 0.5
     way = _along(engine, motions[0], turn) if motions else None
     if way is None:
         raise SolverError(engine.mobility.start_refusal)
@@ -78,7 +78,7 @@ def _along(engine: Engine, way: Direction, turn: float) -> Collocation | None:
 # Choice of the branch ------------------------------------------------------------------------------------------------
 
 
-def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) -> list[Direction]:
+def _matching_directions(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) -> list[Direction]:
     """Return the directions that satisfy the choices. Raise an error when there are several."""
     if len(ways) > 1:
         until = engine.start + min(way.reaching(WAY) for way in ways)
@@ -182,7 +182,7 @@ def _steady(engine: Engine, y: np.ndarray, rate: np.ndarray) -> Direction:
 
 def directions(engine: Engine, y: np.ndarray) -> list[Direction]:
     """Return all directions that drives and given velocities allow from the state at the start; few or none."""
-    with preserved(engine):
+    with restore_work_array(engine):
         return _Pose(engine, y).directions()
 
 

@@ -24,7 +24,7 @@ from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.observation import ROUNDING as CLOSED
 from flexclear.dynamics.run.evaluation.observation import observe_with, rows_of
-from flexclear.numerics.rotations import continued
+from flexclear.numerics.rotations import without_sign_jumps
 
 #: number of points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1
@@ -172,7 +172,9 @@ def collocate(
     made = Collocation(t, span, series)
     unresolved = _sensitivity(nodes, slopes, span, blur * size)
     sound = (
-        left <= POLYNOMIAL_ERROR and unresolved <= SENSITIVE and _open(sampler, made, nodes) <= blur * POLYNOMIAL_ERROR
+        left <= POLYNOMIAL_ERROR
+        and unresolved <= SENSITIVE
+        and _largest_opening(sampler, made, nodes) <= blur * POLYNOMIAL_ERROR
     )
     return made if sound else None
 
@@ -275,7 +277,7 @@ def _sensitivity(nodes: np.ndarray, slopes: np.ndarray, span: float, size: np.nd
     return float(np.max(np.abs(_integrals(nodes, end) @ slopes - fewer) * span / size))
 
 
-def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
+def _largest_opening(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
     """Return the largest residual of a closure between the points, in fractions of the mechanism's size or as sines."""
     model = sampler.engine.model
     along = model.arrays.table(m.CLOSURE_ROWS, sampler.engine.h)["kind"] == 0
@@ -313,7 +315,7 @@ def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: 
             seen = observe_with(engine, rows, pieces, CLOSED)
             if not np.any(seen["status"]):
                 turned = seen["body_quaternion"].reshape(len(SIDES), -1, 4)
-                seen["body_quaternion"] = continued(turned).reshape(len(SIDES), -1)
+                seen["body_quaternion"] = without_sign_jumps(turned).reshape(len(SIDES), -1)
                 limit = {name: WEIGHTS @ block for name, block in seen.items()}
                 mean = limit["body_quaternion"].reshape(-1, 4)
                 limit["body_quaternion"] = (mean / np.linalg.norm(mean, axis=1, keepdims=True)).ravel()

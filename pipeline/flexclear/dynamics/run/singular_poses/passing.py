@@ -12,7 +12,7 @@ from flexclear.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.refusals.reach import beyond_reach, rest
+from flexclear.dynamics.run.refusals.reach import beyond_reach, describe_rest
 from flexclear.dynamics.run.singular_poses.collocation import Collocation, Lead, Sampler, collocate
 from flexclear.system.errors import SolverError
 
@@ -48,7 +48,7 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     foreseen = control[m.LEFT] >= TOO_LITTLE and t < control[m.PASS_TIME] < NEVER
     sampler, slope = Sampler(engine), None
     if foreseen:
-        y, slope = _closed(sampler, t, y)
+        y, slope = _closed_state_and_slope(sampler, t, y)
     made, reach = _over(sampler, t, y, slope) if slope is not None else (_out(sampler, t, y), 0.0)
     passes = passes_of(sampler, made) if made is not None else ()
     sampler.restore()
@@ -64,7 +64,7 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     return made, passes
 
 
-def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+def _closed_state_and_slope(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     """Return the closed state and its slope; the given state and None when the pose is too near for both."""
     closed, sound = sampler.closed(t, y)
     if not sound or not sampler.attempt(t, closed):
@@ -105,7 +105,9 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
     # is short
     nearest = 3e-4 / fraction * ahead
     while reach >= max(ahead, nearest):
-        made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope, fraction=fraction * reach / ahead)
+        made = collocate(
+            sampler, t, y, _span_within_segment(sampler, t, ahead + reach), slope, fraction=fraction * reach / ahead
+        )
         if made is not None:
             return made, reach
         reach *= 0.5
@@ -121,13 +123,13 @@ def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
     # 1e-6: admissible error of speeds in a pose at the end of a polynomial, as a fraction of the fastest
     lead = Lead(lambda at: y + (at - t) * rate, 1e-6)
     for k in range(REACH_HALVINGS if fastest > 0.0 else 0):
-        made = collocate(sampler, t, y, _within(sampler, t, FIRST_REACH / fastest * 0.5**k), lead)
+        made = collocate(sampler, t, y, _span_within_segment(sampler, t, FIRST_REACH / fastest * 0.5**k), lead)
         if made is not None:
             return made
     return None
 
 
-def _within(sampler: Sampler, t: float, span: float) -> float:
+def _span_within_segment(sampler: Sampler, t: float, span: float) -> float:
     """Return the span, or the rest of the segment."""
     left = float(sampler.engine.control[m.END]) - t
     # 1e-3: a polynomial that leaves less than this fraction of its length to the segment's end is extended to that end
@@ -158,7 +160,7 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
         t = float(
             minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": POSE_TOLERANCE * made.span}).x
         )
-        t = _between(least, float(min((t, *bracket), key=least)), SIDE_DISTANCE * made.span, bracket)
+        t = _interpolate_zero(least, float(min((t, *bracket), key=least)), SIDE_DISTANCE * made.span, bracket)
         if least(t) < VANISHED * np.max(low) and not (
             times_of_passes and t - times_of_passes[-1] < EQUAL_TIMES * made.span
         ):
@@ -167,7 +169,7 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
     return tuple(_pass(sampler, made, t) for t in times_of_passes)
 
 
-def _between(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:
+def _interpolate_zero(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:
     """Return the time at which straight lines on both sides reach zero: the pose itself determines nothing."""
     before, after = least(t - aside), least(t + aside)
     fraction = before / (before + after) if before + after > 0.0 else 0.5
@@ -181,7 +183,7 @@ def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
     J = engine.rows(m.JACOBIAN)
     U, values, _ = np.linalg.svd(closure_rows.natural(engine.model, engine.h, J))
     lost = max(int(np.sum(values < VANISHED * values[0])), 1)
-    reported = np.linalg.svd(closure_rows.scaled(engine.model, engine.h, J), compute_uv=False)
+    reported = np.linalg.svd(closure_rows.scale_rows(engine.model, engine.h, J), compute_uv=False)
     one = Pass(t, closure_rows.condition(reported), lost, closure_rows.worst_joint(engine, U[:, -1]))
     _refuse_rest(engine, made, one, U[:, -lost:])
     return one
@@ -195,4 +197,4 @@ def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray)
     rates = np.max(np.abs(made.states(times)[:, speeds] / engine.model.speed_scales)[:, moving], axis=1, initial=0.0)
     # 1e-5: a loop whose speeds in the pose are below this fraction of those next to it is at rest
     if rates[-1] <= 1e-5 * np.max(rates):
-        raise SolverError(rest(one.time, f"joint {one.joint}, condition number {one.condition:.3g}"))
+        raise SolverError(describe_rest(one.time, f"joint {one.joint}, condition number {one.condition:.3g}"))

@@ -155,7 +155,7 @@ def _frames(recipe: MatricesRecipe, contents: Contents, position: np.ndarray, pa
             raise InputError(where, f"{len(chosen)} nodes cannot carry a frame's rotation", "name at least three")
         tied.append(np.array(chosen))
         origins.append(np.mean([position[table.node == node][0] for node in chosen], axis=0))
-    nodes, frames = models.grouped(tied)
+    nodes, frames = models.flatten_groups(tied)
     return {
         "frame": (("frame",), list(recipe.frames)),
         "frame_position": (("frame", "axis"), np.array(origins)),

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexclear.structure.fe.model import symmetric
-from flexclear.structure.fe.solid.elements import ELEMENTS, Sampled, sampled
+from flexclear.structure.fe.solid.elements import ELEMENTS, Sampled, sample_element
 from flexclear.system.errors import InputError
 
 #: numbers of cell matrices that are evaluated together; bounds the memory
@@ -41,7 +41,7 @@ class Solid:
 
 def stiffness(solid: Solid) -> sp.csr_array:
     """Return the stiffness of all nodes, x y z of each in turn, shape (3 n, 3 n)."""
-    at = sampled(solid.element, ELEMENTS[solid.element].stiffness_order)
+    at = sample_element(solid.element, ELEMENTS[solid.element].stiffness_order)
     (pairs, indices, indptr), n = _pattern(solid), len(solid.nodes)
     data = np.zeros((len(indices), 3, 3))
     for part in chunks(solid, at):
@@ -65,7 +65,7 @@ def stiffness(solid: Solid) -> sp.csr_array:
 
 def mass(solid: Solid) -> sp.csr_array:
     """Return the mass of the nodes for motion along one axis [kg], shape (n, n)."""
-    at = sampled(solid.element, ELEMENTS[solid.element].mass_order)
+    at = sample_element(solid.element, ELEMENTS[solid.element].mass_order)
     (pairs, indices, indptr), n = _pattern(solid), len(solid.nodes)
     products = np.einsum("qa,qb->qab", at.value, at.value).reshape(len(at.weight), -1)
     data = np.zeros(len(indices))
@@ -81,7 +81,7 @@ def stress_stiffness(solid: Solid, displacement: np.ndarray) -> sp.csr_array:
 
     displacement: of the nodes [m], shape (n, 3).
     """
-    at = sampled(solid.element, ELEMENTS[solid.element].stiffness_order)
+    at = sample_element(solid.element, ELEMENTS[solid.element].stiffness_order)
     (pairs, indices, indptr), n = _pattern(solid), len(solid.nodes)
     data = np.zeros(len(indices))
     for part in chunks(solid, at):
@@ -101,7 +101,7 @@ def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) 
     blank = np.zeros(len(cells))
     solid = Solid(element, nodes, cells, blank, blank, blank)
     for order in {ELEMENTS[element].stiffness_order, ELEMENTS[element].mass_order}:
-        at = sampled(element, order)
+        at = sample_element(element, order)
         low = np.concatenate([_jacobian(solid, part, at)[0].min(axis=1) for part in chunks(solid, at)])
         wrong = np.flatnonzero(~(low > 0.0))
         if wrong.size:

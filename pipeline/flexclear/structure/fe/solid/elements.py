@@ -94,7 +94,7 @@ ELEMENTS = {
 
 
 @cache
-def sampled(name: str, order: int) -> Sampled:
+def sample_element(name: str, order: int) -> Sampled:
     """Return the shape functions of an element at the points of a quadrature of this order."""
     element = ELEMENTS[name]
     points, weight = get_quadrature(element.basis.refdom, order)

@@ -29,16 +29,16 @@ class Geometry:
     cell_regions: dict[str, np.ndarray]
 
 
-def generated(shape: Cylinder | Block) -> Geometry:
+def generate_mesh(shape: Cylinder | Block) -> Geometry:
     """Generate the mesh of a cylinder or block."""
     if isinstance(shape, Cylinder):
         n = shape.cells
         nodes, cells = lattice.cylinder(shape.radius, shape.length, n.along, n.across, n.rings)
         length = shape.length
     else:
-        nodes, cells = lattice.block(shape.size, shape.cells)
+        nodes, cells = lattice.box_cells(shape.size, shape.cells)
         length = shape.size[0]
-    nodes, cells = lattice.cut(nodes, cells, shape.element)
+    nodes, cells = lattice.cut_cells(nodes, cells, shape.element)
     x = nodes[:, 0]
     bare = Geometry(shape.element, nodes, cells, {}, {"body": np.arange(len(cells))})
     start, end = (np.flatnonzero(np.abs(x - end_at) < 1e-9 * length) for end_at in (0.0, length))

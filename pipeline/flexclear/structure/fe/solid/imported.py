@@ -27,7 +27,7 @@ MOST_REGIONS = 1000
 REWRITE = "export only its solid cells and named sets, or write VTU or Gmsh"
 
 
-def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
+def read_geometry(shape: MeshFile, folder: Path, where: str) -> Geometry:
     """Read the mesh in a file; raise InputError for an unreadable one, or unless it has one type of solid cells."""
     path = folder / shape.file
     mesh = read_mesh(path, where, f"meshio cannot read '{path.name}'", REWRITE)
@@ -110,10 +110,14 @@ def _cell_groups(mesh: Mesh) -> list[tuple[str, list[np.ndarray]]]:
             chosen = [np.flatnonzero(part == value) for part in values]
             groups.append((f"{key}={value}", chosen))
             if key == "gmsh:physical":
-                groups += [(n, _of(mesh, chosen, dim)) for n, (tag, dim) in mesh.field_data.items() if tag == value]
+                groups += [
+                    (n, _cells_of_dimension(mesh, chosen, dim))
+                    for n, (tag, dim) in mesh.field_data.items()
+                    if tag == value
+                ]
     return groups
 
 
-def _of(mesh: Mesh, chosen: list[np.ndarray], dimension: int) -> list[np.ndarray]:
+def _cells_of_dimension(mesh: Mesh, chosen: list[np.ndarray], dimension: int) -> list[np.ndarray]:
     """Return the chosen cells of one dimension: Gmsh numbers the tags of surfaces and of volumes separately."""
     return [part if block.dim == dimension else part[:0] for part, block in zip(chosen, mesh.cells, strict=True)]

@@ -10,10 +10,10 @@ from flexclear.structure.fe.solid.elements import ELEMENTS, HEX_FACES, TET_EDGES
 BULGE = 0.12
 
 
-def block(size: tuple[float, float, float], cells: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+def box_cells(size: tuple[float, float, float], cells: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes (n, 3) and 27-node cells (c, 27) of a box from x = 0, centred in y and z; size [m]."""
     section, quads = _patch(lambda s, t: np.stack([size[1] * (s - 0.5), size[2] * (t - 0.5)], axis=-1), *cells[1:])
-    return _extruded(section, quads, size[0], cells[0])
+    return _extrude(section, quads, size[0], cells[0])
 
 
 def cylinder(radius: float, length: float, along: int, across: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
@@ -30,11 +30,11 @@ def cylinder(radius: float, length: float, along: int, across: int, rings: int) 
     offsets = np.cumsum([0, *(len(points) for points, _ in patches)])
     points = np.vstack([points for points, _ in patches])
     quads = np.vstack([quads + offset for (_, quads), offset in zip(patches, offsets, strict=False)])
-    points, mask = _merged(points, radius)
-    return _extruded(points, mask[quads], length, along)
+    points, mask = _merge_points(points, radius)
+    return _extrude(points, mask[quads], length, along)
 
 
-def cut(nodes: np.ndarray, cells: np.ndarray, element: str) -> tuple[np.ndarray, np.ndarray]:
+def cut_cells(nodes: np.ndarray, cells: np.ndarray, element: str) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes and cells of another element type; each 27-node cell becomes one hexahedron or 24 tetrahedra."""
     if element.startswith("hex"):
         part = cells[:, : len(ELEMENTS[element].local)]
@@ -43,7 +43,7 @@ def cut(nodes: np.ndarray, cells: np.ndarray, element: str) -> tuple[np.ndarray,
     local = _tetrahedra(element)
     value, _ = shape_functions("hex27", local.reshape(-1, 3).T)
     points = np.einsum("pa,cai->cpi", value, nodes[cells], optimize=True).reshape(-1, 3)
-    points, mask = _merged(points, float(np.ptp(nodes, axis=0).max()))
+    points, mask = _merge_points(points, float(np.ptp(nodes, axis=0).max()))
     return points, mask.reshape(-1, local.shape[1])
 
 
@@ -85,7 +85,7 @@ def _shell(s: np.ndarray, t: np.ndarray, half: float, radius: float) -> np.ndarr
     return inner + s[..., None] * (outer - inner)
 
 
-def _merged(points: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+def _merge_points(points: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the points without repetitions, and the new number of each."""
     # neighbours are at least 1e-4 of the size away, equal nodes 1e-15; the offset keeps zero off a grid edge
     grid = np.floor(points / (1e-7 * size) + 0.4142).astype(np.int64)
@@ -93,7 +93,7 @@ def _merged(points: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     return points[first], inverse.ravel()
 
 
-def _extruded(section: np.ndarray, quads: np.ndarray, length: float, layers: int) -> tuple[np.ndarray, np.ndarray]:
+def _extrude(section: np.ndarray, quads: np.ndarray, length: float, layers: int) -> tuple[np.ndarray, np.ndarray]:
     """Extrude section points (n, 2) in y and z along x into layers of 27-node cells."""
     x = np.linspace(0.0, length, 2 * layers + 1)
     n = len(section)

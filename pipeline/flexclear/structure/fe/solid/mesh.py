@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.artifacts.schema import SOLID, conform
-from flexclear.structure.fe.model import grouped
+from flexclear.structure.fe.model import flatten_groups
 from flexclear.structure.fe.solid import geometry as geometries
 from flexclear.structure.fe.solid import imported, step, ties
 from flexclear.structure.fe.solid.elements import ELEMENTS
@@ -26,9 +26,9 @@ def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
     if isinstance(shape, StepFile):
         geometry = step.read(shape, folder, where)
     elif isinstance(shape, MeshFile):
-        geometry = imported.read(shape, folder, where)
+        geometry = imported.read_geometry(shape, folder, where)
     else:
-        geometry = geometries.generated(shape)
+        geometry = geometries.generate_mesh(shape)
     geometries.check(geometry, where)
     names, region = _materials(recipe, geometry, path)
     materials = [recipe.materials.get(name) or recipe.material for name in names]
@@ -71,7 +71,7 @@ def _regions(geometry: Geometry) -> dict[str, Any]:
     """Return the boundary nodes of each named region, as variables of schema SOLID."""
     outside = geometries.boundary_nodes(geometry)
     regions = {name: np.intersect1d(nodes, outside) for name, nodes in ties.regions(geometry).items()}
-    nodes, region = grouped(regions.values())
+    nodes, region = flatten_groups(regions.values())
     return {
         "surface_region": (("surface_region",), list(regions)),
         "patch_node": (("patch",), nodes),
@@ -84,7 +84,7 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any
     names, tied, weights, origins = list(recipe.frames), [], [], []
     for k, (name, frame) in enumerate(recipe.frames.items()):
         where = f"{path} [frames.{name}.on]"
-        nodes = ties.chosen(geometry, frame.on, where)
+        nodes = ties.selected_nodes(geometry, frame.on, where)
         x, weight = geometry.nodes[nodes], ties.areas(geometry, nodes)
         ties.check_rank(x, where)
         if frame.tie == "rigid":
@@ -98,7 +98,7 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any
         tied.append(nodes)
         weights.append(weight)
         origins.append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
-    nodes, frames = grouped(tied)
+    nodes, frames = flatten_groups(tied)
     return {
         "frame": (("frame",), names),
         "frame_tie": (("frame",), [frame.tie for frame in recipe.frames.values()]),

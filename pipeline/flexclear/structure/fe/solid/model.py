@@ -59,7 +59,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         ends=ends,
         integrate=partial(integrals, line, solid.nodes, T),
         families=families(unknowns.position, unknowns.component),
-        drawn=_drawn(mesh, T),
+        drawn=_drawn_surface(mesh, T),
     )
 
 
@@ -110,7 +110,7 @@ def unknowns_of(mesh: xr.Dataset) -> Unknowns:
     positions, component, first = [np.repeat(x[free], 3, axis=0)], [np.tile(np.arange(3), len(free))], {}
     for k in rigid:
         nodes, position = tie_node[tie_frame == k], mesh["frame_position"].values[k]
-        motion = models.carried(x[nodes] - position)
+        motion = models.rigid_displacements(x[nodes] - position)
         rows.append(np.broadcast_to((3 * nodes[:, None] + np.arange(3))[:, :, None], motion.shape).ravel())
         columns.append(np.broadcast_to(size + np.arange(6), motion.shape).ravel())
         values.append(motion.ravel())
@@ -159,7 +159,7 @@ def surface(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return used, cell.reshape(pieces.shape)
 
 
-def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
+def _drawn_surface(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
     used, cell = surface(mesh)
     # nodes of a solid have no rotations
     unknowns, rows = (

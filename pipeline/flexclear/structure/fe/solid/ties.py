@@ -26,7 +26,7 @@ from flexclear.system.errors import InputError
 TOLERANCE = 1e-6
 
 
-def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
+def selected_nodes(geometry: Geometry, on: On, where: str) -> np.ndarray:
     """Return the nodes that a rule selects, ascending; raise InputError for no node or an unknown region."""
     if on.region is not None:
         named = regions(geometry)
@@ -35,7 +35,7 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
             raise InputError(f"{where[:-1]}.region]", f"no region is called '{on.region}'", hint)
         nodes = named[on.region]
     else:
-        nodes = _on_surface(geometry, on)
+        nodes = _nodes_on_surface(geometry, on)
     if nodes.size == 0:
         x = geometry.nodes
         box = " to ".join(str([float(f"{v:.6g}") for v in end]) for end in (x.min(axis=0), x.max(axis=0)))
@@ -49,7 +49,7 @@ def regions(geometry: Geometry) -> dict[str, np.ndarray]:
     return of_cells | geometry.node_regions
 
 
-def _on_surface(geometry: Geometry, on: On) -> np.ndarray:
+def _nodes_on_surface(geometry: Geometry, on: On) -> np.ndarray:
     outside = boundary_nodes(geometry)
     x = geometry.nodes[outside]
     if on.plane is not None:

@@ -21,7 +21,7 @@ from flexclear.system.errors import InputError
 
 def free_free(model: Model, given: Given) -> Condition:
     """Return the condition for normal modes of the free body; `given` is not used."""
-    return _free(model, "the six rigid-body modes below the gap in the free body's frequencies were removed")
+    return _free_condition(model, "the six rigid-body modes below the gap in the free body's frequencies were removed")
 
 
 def craig_chang(model: Model, given: Given) -> Condition:
@@ -34,7 +34,7 @@ def craig_chang(model: Model, given: Given) -> Condition:
     """
     distinct(interfaces_of(given, 1, "attachment modes need an interface to load"))
     note = "six rigid-body modes were removed; the attachment modes' rigid motion was removed by mass orthogonality"
-    return _free(model, note, rows(given.interfaces, model.size))
+    return _free_condition(model, note, rows(given.interfaces, model.size))
 
 
 def residual_flexibility(model: Model, given: Given) -> Condition:
@@ -60,7 +60,7 @@ def mean_axis(model: Model, given: Given) -> Condition:
     return replace(based, mean_axes=True, note=note)
 
 
-def _free(model: Model, note: str, loaded: sp.csr_array | None = None) -> Condition:
+def _free_condition(model: Model, note: str, loaded: sp.csr_array | None = None) -> Condition:
     """Return the condition for normal modes of the free body, and attachment modes for `loaded` functionals."""
     none = sp.csr_array((0, model.size))
     return Condition(none, note, np.empty(0, dtype=int), none if loaded is None else loaded, mean_axes=True)

@@ -20,7 +20,7 @@ DEPENDENT = 1e-10
 def cantilever(model: Model, given: Given) -> Condition:
     """Return the condition for normal modes with the first interface clamped; raise InputError without interfaces."""
     first = interfaces_of(given, 1, "a cantilever is clamped at an interface")[0]
-    return _holding(first.motion, f"the body frame moves with '{first.name}', where all shapes vanish")
+    return _held_condition(first.motion, f"the body frame moves with '{first.name}', where all shapes vanish")
 
 
 def craig_bampton(model: Model, given: Given) -> Condition:
@@ -34,7 +34,7 @@ def craig_bampton(model: Model, given: Given) -> Condition:
     held = rows(given.interfaces, model.size)
     first = given.interfaces[0].name
     note = f"the body frame moves with '{first}', where all shapes vanish; no rigid motion is left"
-    return _holding(held, note, moved=np.arange(6, held.shape[0]))
+    return _held_condition(held, note, moved=np.arange(6, held.shape[0]))
 
 
 def given_shapes(model: Model, given: Given) -> Condition:
@@ -74,7 +74,7 @@ def fixed_fixed(model: Model, given: Given) -> Condition:
         raise InputError(WHERE, "one element has no coordinate between two clamped ends", "use at least 2")
     names = " and ".join(f"'{end.name}'" for end in model.ends)
     note = f"the body frame moves with the clamped {names}; no rigid motion is left"
-    return _holding(rows(model.ends, model.size), note)
+    return _held_condition(rows(model.ends, model.size), note)
 
 
 def pinned_pinned(model: Model, given: Given) -> Condition:
@@ -94,7 +94,7 @@ def pinned_pinned(model: Model, given: Given) -> Condition:
     held = sp.vstack([first.motion[:3], turning, sp.csr_array(np.array(across)) @ second.motion[:3]], format="csr")
     held.eliminate_zeros()
     note = f"the body frame moves with the pins '{first.name}' and '{second.name}'; no rigid motion is left"
-    return _holding(sp.csr_array(held), note)
+    return _held_condition(sp.csr_array(held), note)
 
 
 def constrained(model: Model, given: Given) -> Condition:
@@ -102,10 +102,10 @@ def constrained(model: Model, given: Given) -> Condition:
     if not given.held:
         raise InputError("modes.held", "no motion is held", 'list at least six, as held = ["top.x", "top.rz", ...]')
     held = sp.csr_array(sp.vstack([_functional(model.interfaces, name) for name in given.held], format="csr"))
-    return _holding(held, f"the body frame is fixed by {', '.join(given.held)}")
+    return _held_condition(held, f"the body frame is fixed by {', '.join(given.held)}")
 
 
-def _holding(held: sp.csr_array, note: str, moved: np.ndarray | None = None) -> Condition:
+def _held_condition(held: sp.csr_array, note: str, moved: np.ndarray | None = None) -> Condition:
     """Return the condition with some functionals held, and constraint modes for the `moved` ones."""
     none = sp.csr_array((0, held.shape[1]))
     return Condition(held, note, np.empty(0, dtype=int) if moved is None else moved, none)
