@@ -34,6 +34,8 @@ ELSEWHERE = {
     ("pipeline/flexclear/dynamics/run/ledger.py", "speeds"): {"m/s"},
     ("pipeline/flexclear/dynamics/model/given_start.py", "turned"): {"rad", "deg"},
     ("pipeline/flexclear/dynamics/model/closing.py", "turned"): {"deg"},
+    ("pipeline/flexclear/dynamics/model/contacts.py", "radius"): {"m", "mm"},
+    ("pipeline/flexclear/dynamics/stepwise.py", "resolved"): {"s"},
     ("pipeline/flexclear/post/answers/plan.py", "frequency"): {"%"},
     ("papers/wang_wang_2019/figures/errors.py", "interval"): {"ms"},
 }

@@ -158,8 +158,8 @@ def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
     for scene in loaded:
         findings.errors += scenes.unrecorded(scene)
         complete = findings.attempt(partial(Graph(scene).up_to, "post"), path) and not findings.errors
-        for part in scene.flexible().values():
-            findings.attempt(partial(modal_analysis.check, modal_analysis.params(part)), path)
+        for name, part in scene.flexible().items():
+            findings.attempt(partial(_reference, name, part), path)
         findings.attempt(partial(simulation.check_parts, simulation.params(scene)), path)
         if scene.sections is not None:
             findings.attempt(partial(_sections, scene), path)
@@ -295,11 +295,23 @@ def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[In
         )
 
 
+def _reference(name: str, part: FlexibleBody) -> None:
+    with _in_body(name):
+        modal_analysis.check(modal_analysis.params(part))
+
+
 def _modes(body: Body, name: str, part: FlexibleBody) -> None:
     from flexclear.structure.modes.solution import require_possible
 
-    try:
+    with _in_body(name):
         require_possible(body.model, part.modes, body.interfaces)
+
+
+@contextmanager
+def _in_body(name: str) -> Iterator[None]:
+    """Add a body to the place of an error, which is a key of the body."""
+    try:
+        yield
     except InputError as error:
         raise InputError(f"[body.{name}.{error.place}]", error.problem, error.remedy) from None
 

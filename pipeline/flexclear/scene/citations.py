@@ -16,7 +16,7 @@ _SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULT
 def cited_sources(docstring: str | None) -> list[str]:
     r"""Return the sources that a docstring names, each on one line.
 
-    >>> cited("A law.\n\nSource: Hertz (1881), Journal f. Math.\n92, 156-171.")
+    >>> cited_sources("A law.\n\nSource: Hertz (1881), Journal f. Math.\n92, 156-171.")
     ['Hertz (1881), Journal f. Math. 92, 156-171.']
     """
     return [" ".join(match[1].split()) for match in _SOURCE.finditer(docstring or "")]
