@@ -104,8 +104,9 @@ class Output(Part):
 
     def without(self, bodies: Collection[str]) -> dict[str, Any]:
         """Return the output as a table without the stresses and loads of these bodies."""
-        rest = self.model_dump(mode="json", exclude_none=True, exclude={"gauges", *VARIABLES})
-        lists = {key: [name for name in asked if name not in bodies] for key, asked in self.requests().items()}
+        rest = self.model_dump(mode="json", exclude_none=True, exclude={"gauges", *OF_FLEXIBLE})
+        asked = {key: getattr(self, key) or () for key in OF_FLEXIBLE}
+        lists = {key: [name for name in names if name not in bodies] for key, names in asked.items()}
         gauges = {
             name: gauge.model_dump(mode="json", exclude_none=True)
             for name, gauge in (self.gauges or {}).items()
@@ -118,6 +119,8 @@ class Output(Part):
         return {name: request for name in VARIABLES if (request := getattr(self, name)) is not None}
 
 
+#: keys that list flexible bodies
+OF_FLEXIBLE = ("stress", "frame_loads")
 #: key of `Output` -> variables that it adds to a run; all are optional
 VARIABLES: dict[str, Schema] = {
     "stress": table("""

@@ -14,7 +14,7 @@ from flexclear.scene.formulas import check_formulas
 from flexclear.scene.limits import Limits, check_members, check_rows
 from flexclear.scene.loads import Gravity, Load, SampledPid
 from flexclear.scene.notebook import as_html
-from flexclear.scene.output import Output
+from flexclear.scene.output import OF_FLEXIBLE, Output
 from flexclear.scene.owners import owners
 from flexclear.scene.parts import (
     Body,
@@ -243,7 +243,7 @@ class Scene(Part):
                 raise ValueError(f"{where}{name}: {error}") from None
 
     def _recorded_bodies_are_flexible(self) -> None:
-        for key, name in ((key, name) for key, names in self.output.requests().items() for name in names):
+        for key, name in ((key, name) for key in OF_FLEXIBLE for name in getattr(self.output, key) or ()):
             if name not in self.flexible():
                 known = ", ".join(self.flexible()) or "none"
                 raise ValueError(f"output.{key}: '{name}' is not a flexible body of this scene; known: {known}")

@@ -25,7 +25,7 @@ FEWEST, MOST = 2, 200
 #: families of parts that name frames, and the keys that do
 FRAMES = ("joint", "load", "drive"), ("between", "frame")
 #: settings that list bodies by name
-BODIES = (("ensemble", "bodies"), ("sections", "bodies"), ("output", "stress"))
+BODIES = (("ensemble", "bodies"), ("sections", "bodies"), ("output", "stress"), ("output", "frame_loads"))
 #: recipes that can be cut
 RODS = ("straight-beam", "segmented-beam")
 

@@ -140,7 +140,7 @@ def _compiled(compiler: str, listed: list[Variable], token: str, standard: str, 
     texts = {"TOKEN": token, "PYTHON": sys.executable}
     defined += [f"#define {name} {json.dumps(text, ensure_ascii=False)}" for name, text in texts.items()]
     defined.append(f"static const double START[] = {{{starts}{', ' if starts else ''}0.0}};")
-    (folder / "model.h").write_text("\n".join(defined) + "\n")
+    (folder / "model.h").write_text("\n".join(defined) + "\n", encoding="utf-8", newline="\n")
     library = folder / "model.so"
     options = [f"-DFMI={standard}", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-w", f"-I{folder}"]
     done = subprocess.run([compiler, *options, str(SOURCE), "-o", str(library), "-lm"], capture_output=True, text=True)
@@ -220,7 +220,7 @@ class _Server:
         from flexclear.artifacts import netcdf
 
         folder = Path(unquote(urlparse(where).path) if where.startswith("file:") else where)
-        stored = json.loads((folder / "scene.json").read_text())
+        stored = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
         self.params = stored["params"]
         self.bodies = {
             file.stem.replace(".", "/", 1): netcdf.read(file.read_bytes()) for file in sorted(folder.glob("*.nc"))
