@@ -243,10 +243,11 @@ class Scene(Part):
                 raise ValueError(f"{where}{name}: {error}") from None
 
     def _recorded_bodies_are_flexible(self) -> None:
-        for key, name in ((key, name) for key in OF_FLEXIBLE for name in getattr(self.output, key) or ()):
-            if name not in self.flexible():
-                known = ", ".join(self.flexible()) or "none"
-                raise ValueError(f"output.{key}: '{name}' is not a flexible body of this scene; known: {known}")
+        for key in OF_FLEXIBLE:
+            for name in getattr(self.output, key) or ():
+                if name not in self.flexible():
+                    known = ", ".join(self.flexible()) or "none"
+                    raise ValueError(f"output.{key}: '{name}' is not a flexible body of this scene; known: {known}")
 
     @model_validator(mode="before")
     @classmethod
