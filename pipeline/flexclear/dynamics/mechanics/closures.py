@@ -36,7 +36,9 @@ def closure(rows: Sequence[tuple[int, int, int]], kept: int, a: tuple[Motion, Si
     """
     A, B = carried(*a), carried(*b)
     made = [row(A, B, *one) for one in rows]
-    residuals, residual_rates, gamma, wrenches = (list(column) for column in zip(*made, strict=True))
+    # a joint that an event has opened has no row
+    columns = zip(*made, strict=True) if made else ([], [], [], [])
+    residuals, residual_rates, gamma, wrenches = (list(column) for column in columns)
     on_a = [(wrench * -1.0).about(B.p_WB - a[0].p_WB) for wrench in wrenches[:kept]]
     on_b = [wrench.about(b[0].R_WB @ b[1].p_BS) for wrench in wrenches[:kept]]
     return [*residuals, *residual_rates], gamma[:kept], on_a, on_b
