@@ -57,8 +57,12 @@ class Uses:
         needed = {"bodies": parts.flexible, "contact": bool(parts.forms), "events": bool(scene.event)}
         needed |= {f"integrate.{name}": parts.flexible for name in ("modal_basis", "phi_functions")}
         needed |= {"integrate.guards": bool(parts.frictions), "record.stress": bool(scene.output.stress)}
+        needed |= {f"mechanics.{name}": bool(parts.forms) for name in ("contacts", "surfaces")}
+        # all loads are in one module, whose only source is of controllers
+        controlled = any(effect.name == "controllers" for effect in parts.present)
+        needed |= {"mechanics.flexible": parts.flexible, "mechanics.loads": controlled}
         for effect in EFFECTS:
-            folders = ("bodies", "contact", "equations", "model", "record", "run")
+            folders = ("bodies", "contact", "equations", "mechanics", "model", "record", "run")
             needed |= {f"{folder}.{effect.name}": effect in parts.present for folder in folders}
         self.absent = [*NEVER, *(name for name, there in needed.items() if not there)]
 
