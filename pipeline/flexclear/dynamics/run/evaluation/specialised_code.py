@@ -96,10 +96,11 @@ def address(
 
 
 def has_routines(model: Model) -> bool:
-    """Return True when routines know all parts of a mechanism, and few enough bearings rub."""
+    """Return True when routines know all parts of a mechanism, few bearings rub, and no load looks up a table."""
     parts = model.parts
     loads, effects = (kind.partition(" ")[0] for kind in parts.loads), (one.name for one in parts.present)
     known = KNOWN.issuperset([*parts.joints, *parts.surfaces, *loads, *effects])
+    known &= not any(" T" in kind for kind in parts.loads)  # tables of `scene.formulas`
     return known and model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
 
 

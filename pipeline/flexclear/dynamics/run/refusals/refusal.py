@@ -22,7 +22,7 @@ OFTEN = 0.05
 def text(engine: Engine, rows: np.ndarray) -> str:
     """Say when and why the stepper stopped; rows: the record so far."""
     failed = int(engine.n[m.EVALUATION])
-    engine.complete()
+    engine.evaluate(float(engine.control[m.TIME]))  # the end of the last step
     engine.n[m.EVALUATION] = failed  # of the trial that came to nothing
     control, n, contacts = engine.control, engine.n, engine.model.contacts
     why = engine.explained()
