@@ -3,6 +3,7 @@
 import os
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -28,6 +29,29 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     tests = Counter(item.path for item in items)
     first = {ROOT / "tests" / name for name in LONG}
     items.sort(key=lambda item: (item.path not in first, -tests[item.path]))
+
+
+_killed: list[str] = []
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport, sched: Any) -> None:
+    """Run the tests of the first worker that the system kills once more; a second one is a failure.
+
+    xdist hands them out again itself, together with all files that the worker had finished, and then waits for ever for
+    results of these.
+    """
+    for name in [name for name, tests in sched.workqueue.items() if all(tests.values())]:
+        del sched.workqueue[name]
+    _killed.append(f"{crashitem}: {report.longrepr}")
+    if len(_killed) == 1:
+        report.outcome = "rerun"  # type: ignore[assignment]  # xdist's own word
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Name the tests over which workers were killed."""
+    for line in _killed:
+        terminalreporter.write_line(f"killed: {line}", red=True)
 
 
 @pytest.fixture(scope="session")
