@@ -22,7 +22,6 @@ from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.routines.store import load
 from flexclear.dynamics.run.evaluation import engine, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
@@ -83,7 +82,6 @@ def silent_text(text: str) -> None:
 def assert_alike(found: Evaluated) -> None:
     """Rates of positions, speeds and ledger; residuals, rates and pivots of the loops; the report."""
     model, h, (w, n) = found.model, found.h, by_routines(found)
-    assert has_routines(model)
     rates, speeds = w[h[m.SLOPES] :][: model.ny], model.speeds
     for part in (slice(speeds.start), speeds, slice(speeds.stop, None)):
         assert apart(rates[part], found.rates[part].astype(float)) < ROUNDING
