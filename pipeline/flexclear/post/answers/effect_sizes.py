@@ -123,17 +123,13 @@ def with_early_changes(result: xr.Dataset, begun: Sequence[tuple[float, Sequence
     """
     rows = [[(c.difference, c.uncertainty) for c in changes] for _, changes in begun]
     early = np.array(rows).reshape(len(begun), result.sizes["quantity"], 2)
-    meanings = (
-        f"{MEANINGS['dropped']}, up to the horizon",
-        "part of that change that may be due to errors of the time integration",
-    )
+    dims, change = ("effect", "quantity"), f"{MEANINGS['dropped']}, up to the horizon"
+    doubt = "part of that change that may be due to errors of the time integration"
     words = "time up to which the members of both variants are one motion each; nan: they always are"
     return result.assign(
+        early=(dims, early[:, :, 0], {"long_name": change}),
+        early_uncertainty=(dims, early[:, :, 1], {"long_name": doubt}),
         horizon=(("effect",), [horizon for horizon, _ in begun], {"units": "s", "long_name": words}),
-        **{
-            name: (("effect", "quantity"), early[:, :, k], {"long_name": meanings[k]})
-            for k, name in enumerate(("early", "early_uncertainty"))
-        },
     )
 
 
