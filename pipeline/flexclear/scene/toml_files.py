@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 import stat
 import tomllib
@@ -35,7 +36,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         text = path.read_text(encoding="utf-8-sig")
         if DEEP.search(text):
             raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")
-        return tomllib.loads(text)
+        return copy.deepcopy(_parsed(text))
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
     except UnicodeDecodeError as error:
@@ -50,6 +51,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
 
 
+#: `check` reads a scene at several of its steps
+_parsed = lru_cache(maxsize=16)(tomllib.loads)
+
+
 def _neighbours(path: Path) -> str | None:
     if any("\\" in part for part in path.parts) or not str(path).isprintable():  # \ separates folders on Windows only
         return "write / between folders, which works on every system"
@@ -60,13 +65,7 @@ def _neighbours(path: Path) -> str | None:
 def recipe_frames(mesh: str) -> list[str] | None:
     """Return the names of the frames in a mesh recipe; None when it cannot be read, which is reported elsewhere."""
     try:
-        status = Path(mesh).stat()
-        return _frames(mesh, status.st_mtime_ns, status.st_size)
+        frames = read_toml(Path(mesh)).get("frames")
     except (OSError, ValueError, InputError):
         return None
-
-
-@lru_cache
-def _frames(mesh: str, changed: int, size: int) -> list[str] | None:
-    frames = read_toml(Path(mesh)).get("frames")
     return list(frames) if isinstance(frames, dict) else None
