@@ -1,10 +1,12 @@
-"""What a notebook shows of scenes, runs and comparisons."""
+"""What a notebook shows of scenes, runs and comparisons, and the notebooks of the documentation."""
 
 import base64
 import io
+import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +14,12 @@ import xarray as xr
 from matplotlib.image import imread
 
 import flexclear as fc
+from benchmarks.site import notebooks
+from flexclear.artifacts.paths import PROJECT
 from flexclear.post.render.sketch import sketch
 from tests.browser import browser, needs_browser
 
+NOTEBOOKS = PROJECT / "docs/notebooks"
 PENDULUM = "scenes/checks/pendulum.toml"
 
 
@@ -97,3 +102,46 @@ def test_a_run_whose_bodies_are_not_known_is_refused(root: Path):
         fc.show(run)
     with pytest.raises(fc.InputError, match="is not that of a run"):
         fc.show(xr.Dataset())
+
+
+def outputs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[dict[str, Any], str]:
+    """A notebook of the documentation after its execution, and what its last cell printed."""
+    if not notebooks.can_execute():
+        pytest.skip("notebooks are executed with nbclient, ipykernel and distributed")
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    done = notebooks.executed(NOTEBOOKS / f"{name}.ipynb")
+    last = [cell for cell in done["cells"] if cell["cell_type"] == "code"][-1]
+    return done, "".join(one["text"] for one in last["outputs"] if one.get("name") == "stdout")
+
+
+@pytest.mark.filterwarnings("ignore")  # of the programs that execute
+def test_the_notebook_of_a_first_mechanism_shows_scene_run_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    done, printed = outputs("first_mechanism", tmp_path, monkeypatch)
+    text, shown = notebooks.page(done)
+    assert sum("<iframe" in one for one in shown) == 2
+    assert sum("<img" in one for one in shown) == 2
+    assert all(text.count(f"\nOUTPUT-{k}-") == 1 for k in range(len(shown)))
+    # the error of a run at the default tolerance, 1e-8 of energies of some joules
+    assert float(re.findall(r"energy (\S+) J", printed)[0]) < 1e-6
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_notebook_of_a_sweep_has_the_speeds_of_the_closed_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    _, printed = outputs("sweep_with_dask", tmp_path, monkeypatch)
+    assert re.findall(r"[\d.]+", printed) == ["1."] * 12  # to three digits, at outputs every 20 ms
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_notebook_of_a_fit_finds_the_numbers_behind_the_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """240 N/m and 3 N s/m within four standard deviations, and the noise of 0.5 mm: 149 residuals know it to 6 %."""
+    _, printed = outputs("fit", tmp_path, monkeypatch)
+    found = [tuple(map(float, pair)) for pair in re.findall(r"(\S+) ± (\S+)", printed)]
+    for (value, uncertain), true in zip(found, (240.0, 3.0), strict=True):
+        assert abs(value - true) < 4.0 * uncertain < 0.02 * true
+    assert float(re.findall(r"noise (\S+) mm", printed)[0]) == pytest.approx(0.5, rel=0.25)
+
+
+def test_notebooks_are_stored_without_outputs():
+    for path in NOTEBOOKS.glob("*.ipynb"):
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells)
