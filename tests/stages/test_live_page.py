@@ -15,6 +15,7 @@ import pytest
 
 from flexclear.commands.__main__ import main
 from flexclear.scene.load import files_read
+from flexclear.stages import live as live_page
 from flexclear.system.errors import INTERRUPTED
 from tests.browser import Browser, browser, needs_browser
 
@@ -136,6 +137,16 @@ def test_followed_are_the_files_that_a_scene_extends_and_those_that_it_names(tmp
     assert files_read(first) == [first, second]
     second.unlink()
     assert files_read(first) == [first, second]
+
+
+def test_only_lines_of_toml_files_are_quoted(tmp_path: Path):
+    """A scene may extend any file that can be read as TOML, such as one with passwords."""
+    (secret := tmp_path / "secret.env").write_text("[body.rod]\nmass = 'a password'\n")
+    (named := tmp_path / "named.toml").symlink_to(secret)
+    (own := tmp_path / "own.toml").write_text(secret.read_text())
+    record = {"line": 2, "place": "x.toml [body.rod.mass]"}
+    quoted = live_page._quoted([{**record, "file": str(file)} for file in (secret, named, own)])
+    assert [one["text"] for one in quoted] == ["", "", "mass = 'a password'"]
 
 
 FOUND = "return document.querySelector('.findings').innerText"

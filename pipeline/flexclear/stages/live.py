@@ -201,7 +201,8 @@ def _quoted(records: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
     for record in records:
         text, place = "", record["place"]
         if record["line"]:
-            place = place[place.find("[") :] if "[" in place else ""
+            place, file = place[place.find("[") :] if "[" in place else "", Path(record["file"]).resolve()
             with suppress(OSError, ValueError, IndexError):
-                text = Path(record["file"]).read_text(encoding="utf-8-sig").splitlines()[record["line"] - 1].strip()
+                if file.suffix == ".toml":  # no other file that a scene names is quoted
+                    text = file.read_text(encoding="utf-8-sig").splitlines()[record["line"] - 1].strip()
         yield {**record, "place": place, "text": text}
