@@ -44,6 +44,7 @@ class Family:
     cases: returns all cases; its arguments are the numbers of `settings`, which `--set` changes.
     measure: measures some cases in at most the given number of processes; yields the records of each case when done.
     show: turns the records of some or all cases into Markdown, or into several parts of the page by name.
+    rows: pattern of the rows that a page shows of long tables, which are complete in docs/tables (`page.shortened`).
     files: files that belong to the page, by path below docs/.
     quick: name of the smallest case, where it takes less than 5 s warm.
     times: True when times are the subject. The log then keeps every measurement, with four digits, since further
@@ -60,6 +61,7 @@ class Family:
     cases: Callable[..., Sequence[Case]]
     measure: Callable[[Sequence[Case], int], Measured]
     show: Callable[[list[Record]], str | Mapping[str, str]]
+    rows: str = ""
     files: Callable[[list[Record]], Mapping[str, bytes]] = lambda records: {}
     quick: str = ""
     settings: Mapping[str, int] = field(default_factory=dict)

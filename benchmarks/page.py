@@ -12,6 +12,7 @@ import io
 import re
 from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ from flexclear.system.errors import InputError
 DOCS = PROJECT / "docs"
 #: columns of a table: heading, and the function that returns a record's cell
 Columns = Mapping[str, Callable[[Record], str]]
+#: most rows of a table that a page shows completely
+LONG_TABLE = 5
 #: longest list of a session's cases [characters]; a longer one is replaced by the number of cases
 LONGEST_LIST = 80
 #: the text where nothing was measured
@@ -61,8 +64,7 @@ def text(page: str, logs: Path = log.FOLDER) -> str:
     sessions = {name: log.latest(logs / f"{name}.jsonl") for name in of_page(page)}
     for name, family in of_page(page).items():
         if sessions[name]:
-            shown = family.show(records(sessions[name]))
-            parts |= {name: shown} if isinstance(shown, str) else {f"{name} {part}": of for part, of in shown.items()}
+            parts |= shown(name, family, records(sessions[name]))[0]
     parts["measured"] = where({name: of for name, of in sessions.items() if of})
     return filled((DOCS / page).read_text(encoding="utf-8"), parts, f"docs/{page}")
 
@@ -72,8 +74,36 @@ def files_of(page: str, logs: Path = log.FOLDER) -> dict[str, bytes]:
     found: dict[str, bytes] = {}
     for name, family in of_page(page).items():
         if sessions := log.latest(logs / f"{name}.jsonl"):
-            found |= family.files(records(sessions))
+            found |= {**family.files(records(sessions)), **shown(name, family, records(sessions))[1]}
     return found
+
+
+def shown(name: str, family: Family, records: list[Record]) -> tuple[dict[str, str], dict[str, bytes]]:
+    """Return the Markdown of a family by its place on the page, and its long tables as CSV files below docs/."""
+    found, tables = family.show(records), dict[str, bytes]()
+    parts = {name: found} if isinstance(found, str) else {f"{name} {part}": of for part, of in found.items()}
+    return {
+        place: shortened(text, place.replace(" ", "-"), family.rows, tables) for place, text in parts.items()
+    }, tables
+
+
+def shortened(text: str, name: str, rows: str, tables: dict[str, bytes]) -> str:
+    """Return Markdown with few rows of each long table, and add the complete ones to `tables` as CSV, by path.
+
+    rows: pattern of the rows that stay; without any the first two and the last one.
+    """
+
+    def few(found: re.Match[str]) -> str:
+        head, rule, *lines = found[0].splitlines()
+        if len(lines) <= LONG_TABLE:
+            return found[0]
+        path = next(p for k in count(1) if (p := f"tables/{name}{f'-{k}' if k > 1 else ''}.csv") not in tables)
+        cells = [tuple(cell.strip() for cell in line.strip("|").split("|")) for line in (head, *lines)]
+        tables[path] = as_csv(Table("", cells[0], tuple(cells[1:]))).encode()
+        kept = [line for line in lines if rows and re.search(rows, line)] or [*lines[:2], lines[-1]]
+        return "\n".join([head, rule, *kept, "", f"[All {len(lines)} rows]({path}).", ""])
+
+    return re.sub(r"(?:^\|.*(?:\n|\Z))+", few, text, flags=re.MULTILINE)
 
 
 def records(sessions: list[Session]) -> list[Record]:

@@ -273,13 +273,14 @@ def examined(name: str) -> Record:
 
 
 def show(records: list[Record]) -> str:
-    """Return a table, and the first part of the messages of the cases that did not finish."""
+    """Return a table, the least margin first, and the first part of the messages of the cases that did not finish."""
     messages = [
         f"- {r['case']} ({r['verdict']}): {' '.join(r['reason'].split()).partition('; ')[0]}"
         for r in records
         if r["reason"]
     ]
-    return table(records, COLUMNS) + (
+    margins = sorted(records, key=lambda r: (r["deviation"] or 0.0) / (r["limit"] or 1.0), reverse=True)
+    return table(margins, COLUMNS) + (
         "\n\nMessages of the cases that did not finish:\n\n" + "\n".join(messages) + "\n" if messages else ""
     )
 

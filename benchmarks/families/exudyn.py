@@ -408,6 +408,7 @@ FAMILY = Family(
     cases=lambda: [Case(name, comparison) for name, comparison in COMPARISONS.items()],
     measure=measure,
     show=show,
+    rows=": 0.1 %",
     files=files,
     needs=("exudyn", "exudyn"),
     children=True,

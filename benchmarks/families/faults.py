@@ -369,6 +369,7 @@ FAMILY = Family(
     cases=cases,
     measure=measure,
     show=lambda records: table(records, COLUMNS),
+    rows="artifacts|compiled code|disks full|`run` killed",
     settings={"seed": 1, "flips": 200, "cuts": 50, "kills": 20},
     times=False,
     children=True,

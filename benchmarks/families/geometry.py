@@ -249,6 +249,7 @@ FAMILY = Family(
     cases=lambda: [Case(name) for name in ROWS],
     measure=each(lambda case: list(ROWS[case.name]())),
     show=show,
+    rows=r"^\| 0\.9 ",
     files=files,
     quick="members",
     times=False,

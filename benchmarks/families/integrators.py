@@ -101,6 +101,7 @@ FAMILY = Family(
     cases=cases,
     measure=measure,
     show=lambda records: table(records, COLUMNS),
+    rows="rtol 1e-10|1e-05 s, at step ends",
     quick="dopri5, rtol 1e-06",
     times=False,
 )

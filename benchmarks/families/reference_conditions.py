@@ -125,11 +125,11 @@ def _share(value: float) -> str:
 
 
 def _frequencies(rows: dict[str, list[Row]]) -> str:
-    """Return the first vibrations of the mechanism at the start, and the sets with which they are right."""
+    """Return the first vibrations of the mechanism, and the sets with which they are right."""
     found = _by_condition(rows["frequencies"])
     right = [c for c in CONDITIONS if _frequency_error(found, c) < RESOLVED]
     return (
-        f"{table([r for r in found if r['time'] == 0.0], _vibrations(3))}\n\n"
+        f"{table(found, VIBRATIONS)}\n\n"
         f"The first three within {100.0 * RESOLVED:g} % of the full rod's at every place and time: {_or_none(right)}."
     )
 
@@ -139,12 +139,16 @@ def _by_condition(rows: list[Row]) -> list[Row]:
     return sorted(rows, key=lambda r: (r["place_mm"], names.index(r["condition"]), r["time"]))
 
 
-def _vibrations(most: int) -> Columns:
-    return {**SET, "time [s]": lambda r: f"{r['time']:g}", **{f"{k + 1}": _vibration(k) for k in range(most)}}
-
-
 def _vibration(k: int) -> Callable[[Row], str]:
     return lambda r: f"{r['frequency'][k]:.1f}" if k < len(r["frequency"]) else "-"
+
+
+#: the lowest six vibrations [Hz]
+VIBRATIONS: Columns = {
+    **SET,
+    "time [s]": lambda r: f"{r['time']:g}",
+    **{f"{k + 1}": _vibration(k) for k in range(6)},
+}
 
 
 def _frequency_error(rows: list[Row], condition: str) -> float:
@@ -159,8 +163,8 @@ def _frequency_error(rows: list[Row], condition: str) -> float:
 
 
 def _far(rows: dict[str, list[Row]]) -> str:
-    """Return effects of the rod and errors with ideal joints, of the sets from COUNT on."""
-    return table(_from_count(_far_rows(rows["far"])), _far_columns(rows["far"]))
+    """Return effects of the rod and errors with ideal joints, of all sets."""
+    return table(_far_rows(rows["far"]), _far_columns(rows["far"]))
 
 
 def _far_rows(rows: list[Row]) -> list[Row]:
@@ -180,11 +184,6 @@ def _far_columns(rows: list[Row]) -> Columns:
     }
 
 
-def _from_count(rows: list[Row]) -> list[Row]:
-    """Return the rows without a count, and of each set at each position the one with the least count from COUNT on."""
-    return [r for r in rows if r["condition"] in (RIGID, FULL) or r is at(rows, r["place_mm"], r["condition"], COUNT)]
-
-
 CLEARANCE: Columns = {
     **SET,
     "members": lambda r: str(r["members"]),
@@ -201,7 +200,7 @@ CLEARANCE: Columns = {
 def _clearance(rows: dict[str, list[Row]]) -> str:
     """Return means and spreads over the members with clearance, and why no ensemble has the complete basis."""
     more = f"{' and '.join(map(str, MOST_COMPLETE))} coordinates next to {COUNT} show what more would change."
-    return f"{_why_not_all(rows)}{more}\n\n{table(_from_count(sorted(rows['clearance'], key=_order)), CLEARANCE)}"
+    return f"{_why_not_all(rows)}{more}\n\n{table(sorted(rows['clearance'], key=_order), CLEARANCE)}"
 
 
 def _why_not_all(rows: dict[str, list[Row]]) -> str:
@@ -274,17 +273,11 @@ FLOOR = 1e-7
 
 
 def files(records: Sequence[Row]) -> dict[str, bytes]:
-    """Return every figure and every complete table whose rows exist, by path below docs/."""
+    """Return every figure, and the tables of claims and layouts, whose rows exist, by path below docs/."""
     of: dict[str, list[Row]] = {}
     for record in records:
         of.setdefault(record["case"], []).append(record)
     found = {f"{name}.png": png(draw(of[group]), dpi=110) for name, (group, draw) in FIGURES.items() if group in of}
-    if "frequencies" in of:
-        found["frequencies.csv"] = csv_table(_by_condition(of["frequencies"]), _vibrations(6))
-    if "far" in of:
-        found["far.csv"] = csv_table(_far_rows(of["far"]), _far_columns(of["far"]))
-    if "clearance" in of:
-        found["clearance.csv"] = csv_table(sorted(of["clearance"], key=_order), CLEARANCE)
     if "far" in of and "clearance" in of:
         found["claims.csv"] = csv_table(*claims.outcomes(of))
     if "layouts" in of:
@@ -406,6 +399,8 @@ FAMILY = Family(
     cases=runs.cases,
     measure=runs.measure,
     show=show,
+    # at 0 mm the sets of 13 coordinates or the next whole count; statements that depend on the layout
+    rows=r"^\| 0 mm .*(full|rigid|\S 1[34] )(?!.* 0\.09 )|\| +(12|13|13/12) \||^\| full|depends on the layout",
     files=files,
     quick="mesh",
     settings={"members": 8},

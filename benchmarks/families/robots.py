@@ -256,5 +256,6 @@ FAMILY = Family(
     cases=cases,
     measure=each(_record),
     show=show,
+    rows="double pendulum|UR5|Talos",
     needs=("mujoco", "robots"),
 )

@@ -90,4 +90,5 @@ FAMILY = Family(
     cases=lambda: [Case(name, shape) for name, shape in SHAPES.items()],
     measure=each(_body),
     show=show,
+    rows="displacements|normal modes|counting|together|memory",
 )

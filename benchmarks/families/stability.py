@@ -267,6 +267,7 @@ FAMILY = Family(
     cases=atlas.cases,
     measure=atlas.measure,
     show=show,
+    rows="mass|modes|random",
     files=files,
     settings={"seed": 20190310, "random": 200},
     times=False,

@@ -368,6 +368,7 @@ FAMILY = Family(
     cases=lambda: [Case(name) for name in CASES],
     measure=each(_measured),
     show=_show,
+    rows="uniform shaft, timoshenko|shaft turning about|blade, pitch 45 deg, (rayleigh|solid)|as a solid|5.9.1",
     quick="3a",
     times=False,
 )

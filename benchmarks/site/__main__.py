@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from collections.abc import Callable
 from functools import partial
 
 from benchmarks.page import DOCS
 from benchmarks.site import keys, reference
-from flexclear.artifacts.paths import PROJECT
-
-
-def readme() -> str:
-    """Return the README as first page, with links relative to docs/, without the list that the site's menu has."""
-    page = (PROJECT / "README.md").read_text(encoding="utf-8").partition("## Read on\n")[0].rstrip() + "\n"
-    return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)
-
 
 #: page below docs/ -> function that returns its text
 PAGES: dict[str, Callable[[], str]] = {
-    "index.md": readme,
     "reference/python.md": reference.python,
     "datasets.md": reference.datasets,
-    "datasets/structure.csv": reference.structure,
+    "datasets/variables.csv": reference.variables,
     "reference/quantities.md": reference.quantities,
     **{f"reference/{kind}.md": partial(keys.page, kind) for kind in keys.HEADS},
 }

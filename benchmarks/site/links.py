@@ -1,12 +1,24 @@
-"""MkDocs hook: links that lead out of docs/ become text, since the site does not hold their targets."""
+"""MkDocs hook: the README is the first page; links out of docs/ become text, since the site lacks their targets."""
 
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 #: a link to a file of the project that is no page of the site
 _OUTSIDE = re.compile(r"\[([^\]\n]+)\]\(((?:\.\./)+|(?=examples/|SECURITY))([^)\s]+)\)")
+
+
+def on_files(files: Any, config: Any, **_: Any) -> Any:
+    """Add the README as first page, with links relative to docs/, without the list that the site's menu has."""
+    from mkdocs.structure.files import File
+
+    path = Path(config["docs_dir"]).parent / "README.md"
+    page = path.read_text(encoding="utf-8").partition("## Read on\n")[0].rstrip() + "\n"
+    page = re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)
+    files.append(File.generated(config, "index.md", content=page))
+    return files
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import re
 from collections.abc import Iterable
 
 import flexclear as fc
@@ -14,7 +13,6 @@ from flexclear.artifacts.schema import Schema
 from flexclear.post.plotting.table import Table, as_csv
 from flexclear.post.sections.verdict import VERDICT
 from flexclear.post.single_run.schema import POST
-from flexclear.scene.output import Variable
 from flexclear.scene.quantity import CONTACT_REDUCTIONS, KINDS, OWNERS, SERIES, WORDS, Kind
 
 RECIPES = DOCS / "examples" / "datasets"
@@ -33,9 +31,6 @@ DATASETS: dict[str, tuple[str, Schema]] = {
     "Campbell diagram": ("from `flexclear frequencies --speeds`", artifacts.CAMPBELL),
     "Sections": ("from `flexclear sections`", artifacts.SECTIONS),
     "Verdict": ("from `flexclear sections`", VERDICT),
-}
-#: datasets of stages 1 to 3, whose variables are in a file of their own
-STRUCTURE: dict[str, tuple[str, Schema]] = {
     "Reduced body": ("`bundle/<body>.nc`", artifacts.BUNDLE),
     "Modes": ("`modes/<body>.nc`", artifacts.MODES),
     "Mesh of a beam": ("`mesh/<body>.nc`", artifacts.MESH),
@@ -43,51 +38,44 @@ STRUCTURE: dict[str, tuple[str, Schema]] = {
     "Matrices of another program": ("`mesh/<body>.nc`", artifacts.MATRICES),
     "Rigid body of a mesh": ("kept in the cache alone, for bodies of the type rigid with a mesh", artifacts.RIGID),
 }
-STRUCTURE_HEAD = """## Mesh, modes, reduced body
-
-`mesh/<body>.nc`, `modes/<body>.nc` and `bundle/<body>.nc`. [All of their variables](datasets/structure.csv) have
-dimensions, units and meanings there, and as attributes of their own: `print(bundle["first_moment"])`.
-
-## Coordinates
-
-The same names mean the same in all datasets. Other dimensions have names, or numbers from 0, of their entries.
-
-"""
 DATASETS_HEAD = """# Datasets
 
-Results are NetCDF-4 files that follow the CF conventions, and xarray datasets in Python. Values are selected by the
-name of a body, joint, mode or contact. Units are SI, as UDUNITS reads them. `python -m benchmarks.site` writes the
-tables from the schemas that every dataset is checked against; the recipes run as tests.
+After this page you can open results, select values and know their units. Results are NetCDF-4 files that follow the CF
+conventions, and xarray datasets in Python. Values are selected by the name of a body, joint, mode or contact. Units are
+SI, as UDUNITS reads them. **[All variables and coordinates](datasets/variables.csv)** have dimensions, units and
+meanings there, and as attributes of their own: `print(run["joint_force"])`. `python -m benchmarks.site` writes this
+page from the schemas that every dataset is checked against; the recipes run as tests.
 
 - **Two units** (`N; N m`): the second belongs to entries that turn. Where a variable has both kinds, the coordinate
   `<variable>_units` gives the unit of each entry, and `<dimension>_motion` its kind; else the attribute `units` does.
 - **Modal coordinates** belong to shapes with a modal mass of 1 kg, so that their unit is m.
 - **Rows** of a run: the regular outputs, breaks of drives, events, and the deepest points of contacts.
+- **Coordinates** of one name mean the same in all datasets.
 - **Attributes**: `title`; `source`, the version that made the file; `references`, publications of the methods;
   `parameters` of the scene as JSON; `versions` of libraries; `warnings`. post.nc, and what `flexclear.run` returns,
   have `sources` and `assumptions` of the scene's values as well. No file names its time or machine: equal inputs give
   equal bytes.
-- **Lines** below: name, (dimensions), [unit] and meaning; texts have no unit. `*`: of parts that a scene may lack.
+
+"""
+VARIABLES = """## Variables
+
+Names only, each where it comes first; of parts that a scene lacks there are none. Variables over time are
+[quantities](reference/quantities.md), which have their meanings there. A variable that ends in `_mean` has a standard
+deviation (`_std`) and quantiles (`_quantile`) over the members, too.
 
 """
 
 
 def datasets() -> str:
-    """Return docs/datasets.md: every dataset, variable and coordinate of the schemas, and recipes for reading them."""
-    parts = [
-        DATASETS_HEAD,
-        "## Recipes\n\n",
-        *(_recipe(path.read_text(encoding="utf-8")) for path in sorted(RECIPES.glob("*.py"))),
-    ]
-    known: Schema = {}
+    """Return docs/datasets.md: recipes for reading datasets, and the names of the variables of each."""
+    recipes = [_recipe(path.read_text(encoding="utf-8")) for path in sorted(RECIPES.glob("*.py"))]
+    parts, known = [DATASETS_HEAD, "## Recipes\n\n", *recipes, VARIABLES], set[tuple[str, str]]()
     for heading, (where, schema) in DATASETS.items():
-        own = {name: v for name, v in schema.items() if heading != "Vibrations" or name not in artifacts.EQUILIBRIUM}
-        parts.append(
-            f"## {heading}\n\n{where[0].upper()}{where[1:]}.\n\n{_repeated(own, known)}{_table(own, known)}\n\n"
-        )
-        known = {**own, **known}
-    parts.append(f"{STRUCTURE_HEAD}{_coordinates()}\n")
-    return "".join(parts)
+        own = [(name, v.long_name) for name, v in schema.items() if not name.endswith(STATISTICS)]
+        names = ", ".join(f"`{name}`" for name, meaning in own if (name, meaning) not in known)
+        parts.append(f"### {heading}\n\n{where[0].upper()}{where[1:]}. {names}.\n\n".replace(". .", "."))
+        known |= set(own)
+    return "".join(parts).rstrip() + "\n"
 
 
 def _recipe(source: str) -> str:
@@ -95,64 +83,23 @@ def _recipe(source: str) -> str:
     return f"### {title.removesuffix('.')}\n\n```python\n{code.strip()}\n```\n\n"
 
 
-#: endings of the statistics of a variable over the members of an ensemble
-STATISTICS = ("_mean", "_std", "_quantile")
+#: endings of the further statistics of a variable over the members of an ensemble
+STATISTICS = ("_std", "_quantile")
 
 
-def _table(schema: Schema, known: Schema) -> str:
-    """Return the variables as a list, those of `known` left out, and the statistics of a variable in one line."""
-    rows = []
-    for name, v in schema.items():
-        if _known(name, v, known) or name.endswith(STATISTICS[1:]):
-            continue
-        stem, meaning = name.removesuffix(STATISTICS[0]), v.long_name
-        if stem != name:
-            name = f"{stem}{STATISTICS[0]}, {', '.join(STATISTICS[1:])}"
-            meaning = "mean, standard deviation and (first dimension quantile) quantiles over the members"
-        dims = f" ({_dims(v)})" if v.dims else ""
-        rows.append(f"- `{name}`{'*' if v.optional else ''}{dims}{_units(v)}: {meaning}")
-    return _lines(rows)
-
-
-def structure() -> str:
-    """Return docs/datasets/structure.csv: every variable of meshes, modes and reduced bodies."""
+def variables() -> str:
+    """Return docs/datasets/variables.csv: every variable of every dataset, then the coordinates."""
     heads = ("dataset", "file", "variable", "optional", "dimensions", "unit", "unit where it turns", "meaning")
+    of: dict[str, tuple[str, Schema]] = {**DATASETS, "Coordinates": ("", COORDINATES)}
     rows = tuple(
-        (heading, where.replace("`", ""), name, "yes" if v.optional else "", _dims(v), v.units, v.turning, v.long_name)
-        for heading, (where, schema) in STRUCTURE.items()
+        (
+            *(heading, where.replace("`", ""), name, "yes" if v.optional else ""),
+            *(", ".join(v.dims), v.units, v.turning, v.long_name),
+        )
+        for heading, (where, schema) in of.items()
         for name, v in schema.items()
     )
     return as_csv(Table("", heads, rows))
-
-
-def _coordinates() -> str:
-    """Return the coordinates, without those that are but names or numbers of the entries of their dimension."""
-    plain = re.compile(r"(name|number) of the [\w-]+(, from 0)?")
-    return _lines(
-        f"- `{name}`{'' if v.dims == (name,) else f' ({_dims(v)})'}{_units(v)}: {v.long_name}"
-        for name, v in COORDINATES.items()
-        if not (v.dims == (name,) and plain.fullmatch(v.long_name))
-    )
-
-
-def _dims(variable: Variable) -> str:
-    return ", ".join(variable.dims)
-
-
-def _known(name: str, variable: Variable, known: Schema) -> bool:
-    return name in known and known[name].long_name == variable.long_name
-
-
-def _repeated(schema: Schema, known: Schema) -> str:
-    """Return a sentence on the variables that an earlier dataset has, with their dimensions here."""
-    same = [f"`{name}`{f' ({_dims(v)})' if v.dims else ''}" for name, v in schema.items() if _known(name, v, known)]
-    return f"With the meanings above: {', '.join(same)}.\n\n" if same else ""
-
-
-def _units(variable: Variable) -> str:
-    """Return the unit in brackets; nothing for words."""
-    units = "; ".join(unit for unit in (variable.units, variable.turning) if unit)
-    return f" [{units}]" if units else ""
 
 
 QUANTITIES = """# Quantities

@@ -30,7 +30,7 @@ FACTS = ("title", "method", "evaluations", "steps", "versions")
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Stage: write ``index.html`` and ``paper.md`` from the results folder.
+    """Stage: write ``index.html``, and ``paper.md`` with its two lists as CSV, from the results folder.
 
     params: the folder, the run of each scene below it, the sources of its values, the scene of film and pictures, and
     the digest of everything on the page, so that each change writes the page again.
@@ -41,7 +41,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         with xr.open_dataset(results / path) as one:
             attributes[scene] = {**one.attrs, **params["origins"][scene]}
     content = collect(results, attributes, params["rendered"], PROJECT)
-    return {"index.html": html_page(content).encode(), "paper.md": paper_markdown(content).encode()}
+    lists = {f"{name}.csv": as_csv(table).encode() for name, table in paper_lists(content).items()}
+    return {"index.html": html_page(content).encode(), "paper.md": paper_markdown(content).encode(), **lists}
 
 
 def collect(
@@ -97,21 +98,21 @@ def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> list[A
 
 
 def paper_markdown(content: Content) -> str:
-    """Return docs/paper.md: all figures and tables with scenes and commands, the tables, assumptions, discrepancies."""
+    """Return docs/paper.md: what the tables say next to the paper's, the weightiest assumptions, discrepancies."""
+    assumed = paper_lists(content)["assumptions"]
     parts = [
         "# The paper, reproduced\n",
-        f"{CITATION}. `make all` computes every number of this page: `flexclear run` brings scenes up to date, "
-        f"`{PROGRAM}` then draws figures and tables into `results/figures` and `results/tables`, and writes this "
-        "page.\n",
-        "## Figures and tables\n",
-        _index(),
+        f"After this page you know what of {CITATION}, holds here. `make all` (`{PROGRAM}`) computes every number: it "
+        "brings the scenes up to date, draws `results/figures` and `results/tables`, and writes this page "
+        "(`results/report/paper.md`).\n",
+        "[All figures and tables, and the scenes that each takes](paper/figures.csv). [All assumptions]"
+        "(paper/assumptions.csv).\n",
         "## Tables\n",
         "Tables of given parameters, and what could not be integrated: `results/tables`.\n",
         *_results(content.tables),
         "## Assumptions\n",
-        "Values that the paper does not print, without those that follow from others. Each is marked `assumed` in "
-        "its scene file.\n",
-        _pipe(("value", "assumption", "scenes"), [r for r in assumption_rows(content) if "follows from" not in r[1]]),
+        "The weightiest values that the paper does not print. Each is marked `assumed` in its scene file.\n",
+        _pipe(assumed.columns, assumed.rows[:SHOWN]),
         "## Discrepancies\n",
         "What the paper leaves open or prints in conflict with itself. Which of its statements on mode sets hold, and "
         "for which position of the prismatic joint: [reference-conditions.md](reference-conditions.md).\n",
@@ -148,24 +149,32 @@ def scenes_of(name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(reference.partition(":")[0] for reference in figures.figure(name).needs))
 
 
-def _index() -> str:
+def paper_lists(content: Content) -> dict[str, Table]:
+    """Return the lists of docs/paper: figures with their scenes, and assumptions that follow from no other."""
     rows = []
     for name in figures.NAMES:
         scenes = ", ".join(
             f"`{scene}`" if "/" in scene else f"timing of the `{scene}` scenes" for scene in scenes_of(name)
         )
         rows.append((figures.figure(name).title, scenes))
-    return _pipe(("figure or table", "scenes"), rows)
+    assumed = tuple(row for row in assumption_rows(content) if "follows from" not in row[1])
+    return {
+        "figures": Table("", ("figure or table", "scenes"), tuple(rows)),
+        "assumptions": Table("", ("value", "assumption", "scenes"), assumed),
+    }
 
 
 def _results(tables: Mapping[str, Table]) -> Iterator[str]:
-    """Yield the tables of results, each note once."""
+    """Yield the tables of results, each note once: short ones complete, of verdicts statement and verdict."""
     known: set[str] = set()
-    for table in (table for name, table in tables.items() if name not in PARAMETERS):
+    for name, table in ((name, table) for name, table in tables.items() if name not in PARAMETERS):
         new = [note for note in table.notes if note not in known and not note.startswith("What could not be")]
         known |= set(new)
         notes = "".join(f"\n{note}\n" for note in new)
-        yield f"### {table.title}\n\n{_pipe(table.columns, table.rows)}{notes}"
+        shown = f"{_pipe(table.columns, table.rows)}\n" if len(table.rows) <= SHOWN else ""
+        if name == VERDICTS:
+            shown = f"{_pipe(table.columns[1:3], [row[1:3] for row in table.rows])}\n"
+        yield f"### {table.title}\n\n{shown}[The table as CSV](paper/{name}.csv).\n{notes}"
 
 
 def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -222,6 +231,8 @@ def _pictures(text: str, folder: Path, requested: Sequence[str] | None) -> str:
     return re.sub(r'<p>\s*<img src="([^"]+)" alt="([^"]*)"\s*/?>\s*</p>', shown, text)
 
 
+#: most rows of a table, and of the assumptions, that docs/paper.md shows
+SHOWN = 5
 #: the table with a verdict on each statement, and its words
 VERDICTS = "table_verdicts"
 GOOD, BAD = ("holds",), ("does not hold",)

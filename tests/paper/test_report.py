@@ -84,12 +84,13 @@ def test_equal_assumptions_of_scenes_are_listed_once_and_different_ones_all():
     ]
 
 
-def test_paper_page_lists_every_figure_with_its_scenes(content):
+def test_paper_page_names_its_tables_and_every_figure_with_its_scenes(content):
+    listed = report.paper_lists(content)["figures"].rows
+    for name, (title, scenes) in zip(figures.NAMES, listed, strict=True):
+        assert title == figures.figure(name).title
+        assert all(f"`{scene}`" in scenes for scene in report.scenes_of(name) if "/" in scene)
     text = report.paper_markdown(content)
-    for name in figures.NAMES:
-        assert f"| {figures.figure(name).title} |" in text
-        assert all(f"`{scene}`" in text for scene in report.scenes_of(name) if "/" in scene)
-    assert "| equal error: integration (ideal = 1) |" in text
+    assert all(f"](paper/{name}.csv)" in text for name in ("figures", "assumptions", "table08", "table10"))
 
 
 def test_tables_of_the_paper_page_are_whole(content):

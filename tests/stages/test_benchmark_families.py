@@ -1,5 +1,6 @@
 """The benchmarks as families: one entry, one log, pages that follow from the log alone."""
 
+import csv
 import io
 import json
 import sys
@@ -72,6 +73,31 @@ def test_a_page_says_when_and_where_once(root: Path, name: str):
     assert text.count("<!-- begin measured -->") == 1
     for said in {s.cpu for s in sessions if s.cpu}:
         assert text.count(said) == sum(said in words for words in reported)
+
+
+def test_long_tables_are_short_on_their_page_and_complete_as_csv(root: Path):
+    """No row is lost, every file is linked from its page, and none is left from a former page."""
+    found = dict[str, str]()
+    for name, family in FAMILIES.items():
+        records = page.records(log.latest(log.FOLDER / f"{name}.jsonl"))
+        for path, content in page.shown(name, family, records)[1].items():
+            found[path] = (root / "docs" / family.page).read_text()
+            assert (root / "docs" / path).read_bytes() == content
+            assert f"[All {len(list(csv.reader(io.StringIO(content.decode())))) - 1} rows]({path})" in found[path]
+    assert {f"tables/{path.name}" for path in (root / "docs/tables").iterdir()} == found.keys()
+
+
+def test_a_long_table_keeps_the_rows_of_its_pattern_or_its_ends():
+    head, rows = "| n | x |\n|---|--:|\n", [f"| row {k} | {k} |\n" for k in range(page.LONG_TABLE + 1)]
+    tables: dict[str, bytes] = {}
+    few = page.shortened(f"before\n\n{head}{''.join(rows)}\nafter", "t", "", tables)
+    link = f"\n[All {len(rows)} rows](tables/t.csv).\n"
+    assert few == f"before\n\n{head}{rows[0]}{rows[1]}{rows[-1]}{link}\nafter"
+    assert page.shortened(head + "".join(rows), "t", "row [13]", tables).count("| row") == 2
+    assert list(tables) == ["tables/t.csv", "tables/t-2.csv"]
+    assert tables["tables/t.csv"].decode().splitlines() == ["n,x", *(f"row {k},{k}" for k in range(len(rows)))]
+    short = head + "".join(rows[1:])
+    assert page.shortened(short, "t", "", {}) == short
 
 
 @pytest.mark.parametrize(
