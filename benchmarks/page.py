@@ -95,12 +95,12 @@ def shortened(text: str, name: str, rows: str, tables: dict[str, bytes]) -> str:
 
     def few(found: re.Match[str]) -> str:
         head, rule, *lines = found[0].splitlines()
-        if len(lines) <= LONG_TABLE:
+        kept = [line for line in lines if rows and re.search(rows, line)] or [*lines[:2], lines[-1]]
+        if len(lines) <= LONG_TABLE or kept == lines:
             return found[0]
         path = next(p for k in count(1) if (p := f"tables/{name}{f'-{k}' if k > 1 else ''}.csv") not in tables)
         cells = [tuple(cell.strip() for cell in line.strip("|").split("|")) for line in (head, *lines)]
         tables[path] = as_csv(Table("", cells[0], tuple(cells[1:]))).encode()
-        kept = [line for line in lines if rows and re.search(rows, line)] or [*lines[:2], lines[-1]]
         return "\n".join([head, rule, *kept, "", f"[All {len(lines)} rows]({path}).", ""])
 
     return re.sub(r"(?:^\|.*(?:\n|\Z))+", few, text, flags=re.MULTILINE)

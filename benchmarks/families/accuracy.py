@@ -58,8 +58,8 @@ def show(records: list[Record]) -> str:
 
 
 def _shown(stored: Mapping[str, list]) -> bool:
-    """Return False for costs by quantity, which the pictures show."""
-    return not str(stored["title"]).startswith("What each quantity costs")
+    """Return False for costs, which the advice and the pictures show."""
+    return not str(stored["title"]).startswith(("What accuracy costs", "What each quantity costs"))
 
 
 def _table(stored: Mapping[str, list]) -> Table:

@@ -351,7 +351,7 @@ def show(records: list[Record]) -> str:
         picture = f"![{name}](gallery/{name}.png)\n\n" if (PICTURES / f"{name}.png").is_file() else ""
         parts.append(
             f"## {record['title']}\n\n{picture}*{record['question']}* {record['answer']}\n\n"
-            f"`scenes/{record['scene']}.toml`; one run takes {record['seconds']:.2g} s.\n"
+            f"`scenes/{record['scene']}.toml`\n"
         )
     return "\n".join(parts)
 

@@ -100,19 +100,22 @@ def numbers_of(groups: dict[str, list[Row]], place: int) -> Rows:
 
 
 def judged(groups: dict[str, list[Row]]) -> str:
-    """Return every claim with its outcome, its rule and the numbers of the first position, as Markdown."""
-    lines = []
-    for claim, outcomes in verdicts(groups):
-        place, (_, numbers) = next(iter(outcomes.items()))
-        lines.append(f"**{claim.paper}** {sentence(outcomes)}")
-        lines.append(f"Rule: {claim.rule[0].lower()}{claim.rule[1:]} At {place} mm: {numbers}.\n")
-    return "\n".join(lines)
+    """Return a table of every claim with its outcome."""
+    return pipe_table(
+        ("statement", "here"), [(claim.paper, sentence(outcomes)) for claim, outcomes in verdicts(groups)]
+    )
 
 
 def outcomes(groups: dict[str, list[Row]]) -> tuple[list[Row], Columns]:
-    """Return the rows and the columns of a table of all outcomes, with the numbers of every position."""
+    """Return the rows and the columns of a table of all outcomes, with the rules and the numbers of every position."""
     lines = [
-        {"statement": claim.paper, "joint at [mm]": place, "holds": "yes" if good else "no", "numbers": numbers}
+        {
+            "statement": claim.paper,
+            "joint at [mm]": place,
+            "holds": "yes" if good else "no",
+            "numbers": numbers,
+            "rule": claim.rule,
+        }
         for claim, found in verdicts(groups)
         for place, (good, numbers) in found.items()
     ]
