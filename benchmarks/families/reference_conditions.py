@@ -400,7 +400,7 @@ FAMILY = Family(
     measure=runs.measure,
     show=show,
     # at 0 mm the sets of 13 coordinates or the next whole count; statements that depend on the layout
-    rows=r"^\| 0 mm .*(full|rigid|\S 1[34] )(?!.* 0\.09 )|\| +(12|13|13/12) \||^\| full|\*\*(Holds|Does)|depends on the layout",
+    rows=r"^\| 0 mm .*(full|rigid|\S 1[34] )(?!.* 0\.09 )|\| +(12|13|13/12) \||^\| full|\*\*(Holds|Does)|depends on",
     files=files,
     quick="mesh",
     settings={"members": 8},

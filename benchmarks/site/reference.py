@@ -31,6 +31,9 @@ DATASETS: dict[str, tuple[str, Schema]] = {
     "Campbell diagram": ("from `flexclear frequencies --speeds`", artifacts.CAMPBELL),
     "Sections": ("from `flexclear sections`", artifacts.SECTIONS),
     "Verdict": ("from `flexclear sections`", VERDICT),
+}
+#: datasets of stages 1 to 3, whose variables are in the CSV file alone
+STRUCTURE: dict[str, tuple[str, Schema]] = {
     "Reduced body": ("`bundle/<body>.nc`", artifacts.BUNDLE),
     "Modes": ("`modes/<body>.nc`", artifacts.MODES),
     "Mesh of a beam": ("`mesh/<body>.nc`", artifacts.MESH),
@@ -64,6 +67,10 @@ Names only, each where it comes first; of parts that a scene lacks there are non
 deviation (`_std`) and quantiles (`_quantile`) over the members, too.
 
 """
+STRUCTURE_TEXT = """### Mesh, modes, reduced body
+
+`mesh/<body>.nc`, `modes/<body>.nc` and `bundle/<body>.nc`: their variables are in the file alone.
+"""
 
 
 def datasets() -> str:
@@ -75,7 +82,7 @@ def datasets() -> str:
         names = ", ".join(f"`{name}`" for name, meaning in own if (name, meaning) not in known)
         parts.append(f"### {heading}\n\n{where[0].upper()}{where[1:]}. {names}.\n\n".replace(". .", "."))
         known |= set(own)
-    return "".join(parts).rstrip() + "\n"
+    return "".join(parts) + STRUCTURE_TEXT
 
 
 def _recipe(source: str) -> str:
@@ -90,7 +97,7 @@ STATISTICS = ("_std", "_quantile")
 def variables() -> str:
     """Return docs/datasets/variables.csv: every variable of every dataset, then the coordinates."""
     heads = ("dataset", "file", "variable", "optional", "dimensions", "unit", "unit where it turns", "meaning")
-    of: dict[str, tuple[str, Schema]] = {**DATASETS, "Coordinates": ("", COORDINATES)}
+    of: dict[str, tuple[str, Schema]] = {**DATASETS, **STRUCTURE, "Coordinates": ("", COORDINATES)}
     rows = tuple(
         (
             *(heading, where.replace("`", ""), name, "yes" if v.optional else ""),

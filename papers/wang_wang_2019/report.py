@@ -7,7 +7,7 @@ import html
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ FACTS = ("title", "method", "evaluations", "steps", "versions")
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Stage: write ``index.html``, and ``paper.md`` with its two lists as CSV, from the results folder.
+    """Stage: write ``index.html``, and ``paper.md`` with its lists as CSV, from the results folder.
 
     params: the folder, the run of each scene below it, the sources of its values, the scene of film and pictures, and
     the digest of everything on the page, so that each change writes the page again.
@@ -105,11 +105,11 @@ def paper_markdown(content: Content) -> str:
         f"After this page you know what of {CITATION}, holds here. `make all` (`{PROGRAM}`) computes every number: it "
         "brings the scenes up to date, draws `results/figures` and `results/tables`, and writes this page "
         "(`results/report/paper.md`).\n",
-        "[All figures and tables, and the scenes that each takes](paper/figures.csv). [All assumptions]"
-        "(paper/assumptions.csv).\n",
+        "[All figures and tables, and the scenes that each takes](paper/figures.csv). [All notes on the tables]"
+        "(paper/notes.csv). [All assumptions](paper/assumptions.csv).\n",
         "## Tables\n",
         "Tables of given parameters, and what could not be integrated: `results/tables`.\n",
-        *_results(content.tables),
+        *(_shown(name, table, notes) for name, (table, notes) in _results(content.tables).items()),
         "## Assumptions\n",
         "The weightiest values that the paper does not print. Each is marked `assumed` in its scene file.\n",
         _pipe(assumed.columns, assumed.rows[:SHOWN]),
@@ -150,7 +150,7 @@ def scenes_of(name: str) -> tuple[str, ...]:
 
 
 def paper_lists(content: Content) -> dict[str, Table]:
-    """Return the lists of docs/paper: figures with their scenes, and assumptions that follow from no other."""
+    """Return the lists of docs/paper: figures with their scenes, notes, assumptions that follow from no other."""
     rows = []
     for name in figures.NAMES:
         scenes = ", ".join(
@@ -158,23 +158,30 @@ def paper_lists(content: Content) -> dict[str, Table]:
         )
         rows.append((figures.figure(name).title, scenes))
     assumed = tuple(row for row in assumption_rows(content) if "follows from" not in row[1])
+    notes = tuple((table.title, note) for table, new in _results(content.tables).values() for note in new)
     return {
         "figures": Table("", ("figure or table", "scenes"), tuple(rows)),
+        "notes": Table("", ("table", "note"), notes),
         "assumptions": Table("", ("value", "assumption", "scenes"), assumed),
     }
 
 
-def _results(tables: Mapping[str, Table]) -> Iterator[str]:
-    """Yield the tables of results, each note once: short ones complete, of verdicts statement and verdict."""
-    known: set[str] = set()
+def _results(tables: Mapping[str, Table]) -> dict[str, tuple[Table, list[str]]]:
+    """Return the tables of results by name, each with the notes that no table before it has."""
+    found: dict[str, tuple[Table, list[str]]] = {}
     for name, table in ((name, table) for name, table in tables.items() if name not in PARAMETERS):
-        new = [note for note in table.notes if note not in known and not note.startswith("What could not be")]
-        known |= set(new)
-        notes = "".join(f"\n{note}\n" for note in new)
-        shown = f"{_pipe(table.columns, table.rows)}\n" if len(table.rows) <= SHOWN else ""
-        if name == VERDICTS:
-            shown = f"{_pipe(table.columns[1:3], [row[1:3] for row in table.rows])}\n"
-        yield f"### {table.title}\n\n{shown}[The table as CSV](paper/{name}.csv).\n{notes}"
+        known = {note for _, notes in found.values() for note in notes}
+        found[name] = table, [n for n in table.notes if n not in known and not n.startswith("What could not be")]
+    return found
+
+
+def _shown(name: str, table: Table, notes: Sequence[str]) -> str:
+    """Return a table with its first notes: complete if it is short, of verdicts statement and verdict."""
+    shown = f"{_pipe(table.columns, table.rows)}\n" if len(table.rows) <= SHOWN else ""
+    if name == VERDICTS:
+        shown = f"{_pipe(table.columns[1:3], [row[1:3] for row in table.rows])}\n"
+    first = "".join(f"\n{note}\n" for note in notes[:NOTES])
+    return f"### {table.title}\n\n{shown}[The table as CSV](paper/{name}.csv).\n{first}"
 
 
 def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -231,8 +238,8 @@ def _pictures(text: str, folder: Path, requested: Sequence[str] | None) -> str:
     return re.sub(r'<p>\s*<img src="([^"]+)" alt="([^"]*)"\s*/?>\s*</p>', shown, text)
 
 
-#: most rows of a table, and of the assumptions, that docs/paper.md shows
-SHOWN = 5
+#: most rows of a table and of the assumptions, and most notes on a table, that docs/paper.md shows
+SHOWN, NOTES = 5, 2
 #: the table with a verdict on each statement, and its words
 VERDICTS = "table_verdicts"
 GOOD, BAD = ("holds",), ("does not hold",)

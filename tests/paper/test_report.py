@@ -90,7 +90,13 @@ def test_paper_page_names_its_tables_and_every_figure_with_its_scenes(content):
         assert title == figures.figure(name).title
         assert all(f"`{scene}`" in scenes for scene in report.scenes_of(name) if "/" in scene)
     text = report.paper_markdown(content)
-    assert all(f"](paper/{name}.csv)" in text for name in ("figures", "assumptions", "table08", "table10"))
+    assert all(f"](paper/{name}.csv)" in text for name in ("figures", "notes", "assumptions", "table08", "table10"))
+
+
+def test_every_note_on_the_paper_s_tables_is_listed_once(content):
+    listed = [note for _, note in report.paper_lists(content)["notes"].rows]
+    assert set(listed) == {note for name in ("table08", "table10") for note in content.tables[name].notes}
+    assert len(listed) == len(set(listed)) > report.NOTES
 
 
 def test_tables_of_the_paper_page_are_whole(content):
