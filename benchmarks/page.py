@@ -3,7 +3,8 @@
     <!-- begin growth -->      until <!-- end growth -->: Markdown of that family, or of one named part of it
     <!-- begin measured -->    until <!-- end measured -->: date and machine of the measurements, which appear only here
 
-Everything else on a page is written by hand and is left unchanged.
+Everything else on a page is written by hand and is left unchanged. Long tables are CSV files in docs/tables, of which a
+page shows the rows that its family names.
 """
 
 from __future__ import annotations
