@@ -96,7 +96,7 @@ def shortened(text: str, name: str, rows: str, tables: dict[str, bytes]) -> str:
 
     def few(found: re.Match[str]) -> str:
         head, rule, *lines = found[0].splitlines()
-        kept = [line for line in lines if rows and re.search(rows, line)] or [*lines[:2], lines[-1]]
+        kept = [line for line in lines if rows and re.search(rows, line)] or [*lines[:2], *lines[-1:]]
         if len(lines) <= LONG_TABLE or kept == lines:
             return found[0]
         path = next(p for k in count(1) if (p := f"tables/{name}{f'-{k}' if k > 1 else ''}.csv") not in tables)
