@@ -55,8 +55,8 @@ def _short(rows: dict[str, list[Row]]) -> str:
         )
         enough = _enough(rows["clearance"])
         if enough is not None:
-            lines.append(f"  - Craig-Bampton is so from {enough} coordinates (or the next whole count) on;")
-        lines += [f"  - at {place} mm: {_peaks(rows['clearance'], place)}." for place in PLACES]
+            lines.append(f"    - Craig-Bampton is so from {enough} coordinates (or the next whole count) on;")
+        lines += [f"    - at {place} mm: {_peaks(rows['clearance'], place)}." for place in PLACES]
     return "\n".join(lines) + "\n"
 
 

@@ -167,9 +167,11 @@ def paper_lists(content: Content) -> dict[str, Table]:
 
 
 def _results(tables: Mapping[str, Table]) -> dict[str, tuple[Table, list[str]]]:
-    """Return the tables of results by name, each with the notes that no table before it has."""
+    """Return the tables of results by name, verdicts first, each with the notes that no table before it has."""
     found: dict[str, tuple[Table, list[str]]] = {}
-    for name, table in ((name, table) for name, table in tables.items() if name not in PARAMETERS):
+    for name, table in sorted(tables.items(), key=lambda item: item[0] != VERDICTS):
+        if name in PARAMETERS:
+            continue
         known = {note for _, notes in found.values() for note in notes}
         found[name] = table, [n for n in table.notes if n not in known and not n.startswith("What could not be")]
     return found
