@@ -18,12 +18,14 @@ RESTITUTION_ERROR = 0.05
 class Numbers(NamedTuple):
     """Numbers of a normal law for its form; CONTACT_NUMBERS has the same fields.
 
-    stiffness: K [N/m^n].  damping: C [N s/m], or the hysteresis factor; 0 for a law without loss.
+    stiffness: K [N/m^n].  damping: C [N s/m], or the hysteresis factor; 0 for a law without loss.  values: further ones
+    of the form.
     """
 
     stiffness: float
     exponent: float
     damping: float
+    values: tuple[float, ...] = (0.0,) * 12
 
 
 @dataclass(frozen=True)

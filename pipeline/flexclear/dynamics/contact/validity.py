@@ -32,7 +32,7 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
         return found  # the end of a coordinate has no surfaces
     surfaces = SURFACES[joint.type]
     size = surfaces.contact_size(joint, depth, force)
-    if joint.normal.stiffness is None and size > SMALL_CONTACT * joint.radius:
+    if joint.normal.needs_materials and size > SMALL_CONTACT * joint.radius:
         found.append(
             f"{name}: the contact radius reaches {size:.3g} m, {size / joint.radius:.2g} of the inner "
             f"surface's radius; the stiffness from radii and materials (Hertz) holds below {SMALL_CONTACT:g}"
@@ -101,8 +101,8 @@ def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resol
     found = {
         name: {
             "law": joint.normal.law,
-            "exponent": law.numbers.exponent,
-            "stiffness": law.numbers.stiffness,
+            "exponent": law.numbers.exponent if law.numbers.stiffness else None,
+            "stiffness": law.numbers.stiffness or None,
             "restitution_parameter": law.parameter,
             "delivered_restitution": law.delivered,
             "friction": None if joint.friction is None else joint.friction.law,

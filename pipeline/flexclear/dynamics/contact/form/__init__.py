@@ -7,6 +7,7 @@ Each module has the kernels ``force(depth, rate, impact_rate, law) -> (elastic, 
 
 from __future__ import annotations
 
-from flexclear.dynamics.contact.form import elastic, hysteretic, linear_damper
+from flexclear.dynamics.contact.expression import Laws
+from flexclear.dynamics.contact.form import elastic, expression, hysteretic, linear_damper
 
-FORMS = {"elastic": elastic, "hysteretic": hysteretic, "linear-damper": linear_damper}
+FORMS = Laws({"elastic": elastic, "hysteretic": hysteretic, "linear-damper": linear_damper}, expression.form_of)
