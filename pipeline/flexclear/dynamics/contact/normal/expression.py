@@ -41,7 +41,7 @@ def resolve(law: NormalExpression, mass: float | None, reach: float) -> Resolved
     bends = kinks(kind, values, reach)
     if len(bends) > MOST_KINKS:
         raise ValueError(f"{text} has {len(bends)} kinks at rest, at most {MOST_KINKS}: write fewer max, min and abs")
-    numbers = Numbers(0.0, 1.0, 0.0, ((*values, *(0.0,) * KINKS)[:KINKS] + (*bends, NEVER, NEVER)[:MOST_KINKS]))
+    numbers = Numbers(0.0, 1.0, float(damped), ((*values, *(0.0,) * KINKS)[:KINKS] + (*bends, NEVER, NEVER)[:MOST_KINKS]))
     found = [rebound(kind, numbers.values, 1.0 if mass is None else mass, speed) for speed in SPEEDS]
     for speed, e in zip(SPEEDS, found, strict=True):
         if e > 1.0 + ROUNDING:
