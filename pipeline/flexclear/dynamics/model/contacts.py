@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact.conforming import CONFORMING
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.friction.expression import check
 from flexclear.dynamics.contact.normal import NORMAL_LAWS, expression
@@ -137,12 +139,18 @@ def resolve_law(joint: Clearance | End, mass: float | None, path: str) -> Resolv
     try:
         if normal.law == "expression":
             return expression.resolve(normal, mass, SHALLOW * joint.radius or joint.clearance)
-        if not isinstance(joint, End):
+        tight = CONFORMING[normal.form](joint) if getattr(normal, "form", None) else None
+        if tight is not None:
+            stiffness = tight.stiffness
+        elif not isinstance(joint, End):
             stiffness = SURFACES[joint.type].stiffness(joint, normal.exponent)
         law: Resolved = NORMAL_LAWS[normal.law](normal, stiffness, mass)
     except ValueError as error:
         raise InputError(path, str(error)) from None
-    return law
+    if tight is None:
+        return law
+    numbers = law.numbers._replace(exponent=tight.exponent, values=(*tight.values, *law.numbers.values)[:12])
+    return replace(law, form=tight.form or law.form, numbers=numbers, deepest=tight.deepest)
 
 
 def _reduced_mass(masses: Sequence[float]) -> float | None:

@@ -27,3 +27,14 @@ def integral(force: Callable) -> Callable:
         return total * (end - start)
 
     return over
+
+
+def stored_by(force: Callable) -> Callable:
+    """Build `stored` of a form from its elastic force(depth, law)."""
+    over = integral(force)
+
+    @kernel
+    def stored(depth, law):
+        return over(0.0, depth, law)
+
+    return stored

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from flexclear.dynamics.contact.expression import composed
-from flexclear.dynamics.contact.form.energy import integral
-from flexclear.dynamics.contact.restitution import root
+from flexclear.dynamics.contact.form.damped import inverse
+from flexclear.dynamics.contact.form.energy import integral, stored_by
 from flexclear.dynamics.kernels import kernel
 
 #: place of the first kink of the elastic force among the law's values
@@ -43,18 +43,4 @@ def form_of(kind: str) -> Form:
         first, second = min(depth, law.values[KINKS]), min(depth, law.values[KINKS + 1])
         return up_to(0.0, first, law) + up_to(first, second, law) + up_to(second, depth, law)
 
-    @kernel
-    def in_one(depth, law):
-        return up_to(0.0, depth, law)
-
-    def depth(force: float, law: Any) -> float:
-        if force <= 0.0:
-            return 0.0
-        high = 1e-9
-        while not at_rest(high, law) >= force:
-            high *= 4.0
-            if high > 1e6:
-                raise ValueError(f"the expression of the normal force never reaches {force:.3g} N at rest")
-        return root(lambda d: at_rest(d, law) - force, 0.0, high)
-
-    return Form(force, in_pieces if bends else in_one, depth)
+    return Form(force, in_pieces if bends else stored_by(at_rest), inverse(at_rest))

@@ -41,7 +41,9 @@ def resolve(law: NormalExpression, mass: float | None, reach: float) -> Resolved
     bends = kinks(kind, values, reach)
     if len(bends) > MOST_KINKS:
         raise ValueError(f"{text} has {len(bends)} kinks at rest, at most {MOST_KINKS}: write fewer max, min and abs")
-    numbers = Numbers(0.0, 1.0, float(damped), ((*values, *(0.0,) * KINKS)[:KINKS] + (*bends, NEVER, NEVER)[:MOST_KINKS]))
+    numbers = Numbers(
+        0.0, 1.0, float(damped), ((*values, *(0.0,) * KINKS)[:KINKS] + (*bends, NEVER, NEVER)[:MOST_KINKS])
+    )
     found = [rebound(kind, numbers.values, 1.0 if mass is None else mass, speed) for speed in SPEEDS]
     for speed, e in zip(SPEEDS, found, strict=True):
         if e > 1.0 + ROUNDING:
@@ -64,7 +66,7 @@ def _damped(whole: Callable, values: tuple[float, ...], reach: float, text: str)
     """Return whether the force depends on the rate; raise ValueError for a force that pulls, or is no number."""
     damped = False
     with np.errstate(all="ignore"):
-        for depth in (reach * np.geomspace(1e-7, 1.0, 29)).tolist():
+        for depth in (0.0, *(reach * np.geomspace(1e-7, 1.0, 29)).tolist()):
             at_rest = [float(whole(np.float64(depth), np.float64(0.0), v, values)) for v in SPEEDS]
             if at_rest[0] < 0.0:
                 raise ValueError(f"{text} pulls: it is {at_rest[0]:.4g} N at rest at depth = {depth:.3g}")
