@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from typing import Any
 
@@ -118,10 +118,12 @@ def _power(exponent: float) -> Callable:
     return power
 
 
-def zeros(f: Callable[[float], Any], low: float, high: float) -> Iterator[float]:
-    """Yield the sign changes of f on a grid of powers."""
-    grid = np.geomspace(low, high, 400)
-    signs = [f(x) > 0.0 for x in grid]
-    for a, b, before, after in zip(grid[:-1], grid[1:], signs[:-1], signs[1:], strict=True):
-        if before != after:
-            yield root(f, float(a), float(b))
+def zeros(functions: Iterable[Callable[[float], Any]], low: float, high: float) -> list[float]:
+    """Return the sign changes of functions on a grid of powers, each place once, in ascending order."""
+    grid, found = np.geomspace(low, high, 400).tolist(), list[float]()
+    for f in functions:
+        signs = [f(x) > 0.0 for x in grid]
+        pairs = zip(grid[:-1], grid[1:], signs[:-1], signs[1:], strict=True)
+        found += [root(f, a, b) for a, b, before, after in pairs if before != after]
+    found.sort()
+    return [x for k, x in enumerate(found) if k == 0 or x > (1.0 + 1e-9) * found[k - 1]]

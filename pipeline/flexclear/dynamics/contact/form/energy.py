@@ -8,11 +8,11 @@ import numpy as np
 
 from flexclear.dynamics.kernels import kernel
 
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-#: places in an interval of length 1, and weights: Gauss's formula in the fourth root of the penetration, of which a
-#: power with the exponent 3/2 is a polynomial
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(20)
+#: places in an interval of length 1, and weights: Gauss's formula in the third root of the penetration, which integrates
+#: powers, whole or broken, to rounding
 NODES = tuple(
-    (u**4, 4.0 * u**3 * w) for u, w in zip((0.5 + 0.5 * _POINTS).tolist(), (0.5 * _WEIGHTS).tolist(), strict=True)
+    (u**3, 3.0 * u**2 * w) for u, w in zip((0.5 + 0.5 * _POINTS).tolist(), (0.5 * _WEIGHTS).tolist(), strict=True)
 )
 
 

@@ -24,8 +24,8 @@ def law_of(kind: str) -> Friction:
     def kinks(law: Any) -> tuple[float, float]:
         """Return the first two speeds at which the coefficient has kinks."""
         p = law.encoded[1]
-        found = {at for bend in bends for at in zeros(lambda v, b=bend: b(v, 1.0, 0.0, p), SPEEDS[0], SPEEDS[-1])}
-        first, second, *_ = (*sorted(found), 0.0, 0.0)
+        found = zeros((lambda v, b=bend: b(v, 1.0, 0.0, p) for bend in bends), SPEEDS[0], SPEEDS[-1])
+        first, second, *_ = (*found, 0.0, 0.0)
         return first, second
 
     return Friction(sliding_under(coefficient), constants=lambda law: law.encoded[1], kinks=kinks)

@@ -84,9 +84,7 @@ def kinks(kind: str, values: tuple[float, ...], reach: float) -> list[float]:
     """Return the penetrations up to `reach` at which the slope of the elastic force jumps."""
     bends = list[Callable]()
     composed(kind, bends)
-    return sorted(
-        {at for bend in bends for at in zeros(lambda d, b=bend: b(d, 0.0, 1.0, values), 1e-7 * reach, 10.0 * reach)}
-    )
+    return zeros((lambda d, b=bend: b(d, 0.0, 1.0, values) for bend in bends), 1e-7 * reach, 10.0 * reach)
 
 
 @lru_cache(maxsize=1024)
