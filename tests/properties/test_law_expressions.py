@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 from scipy.integrate import quad
 
 from flexclear.dynamics.contact.expression import OPERATIONS, composed
 from flexclear.dynamics.contact.form import FORMS
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.friction.expression import check
-from flexclear.dynamics.contact.law import Resolved
+from flexclear.dynamics.contact.law import Numbers, Resolved
 from flexclear.dynamics.contact.normal import NORMAL_LAWS
 from flexclear.dynamics.contact.normal.expression import rebound, resolve
 from flexclear.scene.clearance import Friction, NormalLaw
@@ -41,15 +41,15 @@ def resolved(force: str, mass: float | None = MASS, restitution: float | None = 
     return resolve(written(force, restitution, **values), mass, REACH)
 
 
-def as_expression(known: Law) -> Resolved:
+def as_expression(known: Law) -> Any:
     """A law of the program as an expression."""
     K, n, a = known.resolved.numbers[:3]
     unit = f"N/m^{n:g}"
     if known.name == "kelvin-voigt":
-        return resolved(LINEAR, K=f"{K!r} N/m", C=f"{a!r} N s/m")
+        return written(LINEAR, K=f"{K!r} N/m", C=f"{a!r} N s/m")
     if known.name == "hertz":
-        return resolved(ELASTIC, K=f"{K!r} {unit}", n=n)
-    return resolved(HYSTERETIC, K=f"{K!r} {unit}", n=n, a=a)
+        return written(ELASTIC, K=f"{K!r} {unit}", n=n)
+    return written(HYSTERETIC, K=f"{K!r} {unit}", n=n, a=a)
 
 
 def parts(law: Resolved, depth: float, rate: float, impact: float) -> tuple[float, float]:
@@ -71,7 +71,8 @@ def test_the_laws_of_the_program_written_as_expressions_give_their_results_to_ro
     name: str, choice: int, stiffness: float, exponent: float, depth: float, rate: float, impact: float
 ) -> None:
     known = law(name, choice, stiffness, exponent)
-    other = as_expression(known)
+    kind, values = as_expression(known).encoded
+    other = Resolved(kind, Numbers(0.0, 1.0, 1.0, (*values, *(0.0,) * 12)[:12]), None, None)
     elastic, damping = known.parts(depth, rate, impact)
     # sums and powers in another order; a damping that is small against the elastic force has the rounding of that
     size = 8e-16 * max(elastic, abs(damping))
@@ -85,8 +86,8 @@ def test_the_laws_of_the_program_written_as_expressions_give_their_results_to_ro
 def test_delivered_restitutions_of_expressions_are_the_closed_ones(name: str) -> None:
     for c_r in NORMAL[name][1][1::2] or NORMAL[name][1]:
         known = Law(name, c_r, 1e9, 1.0 if name == "kelvin-voigt" else 1.5)
-        found = as_expression(known)
-        assert found.delivered == pytest.approx(known.resolved.delivered, abs=5e-5)  # of steps of a 200th of an impact
+        found = resolve(as_expression(known), MASS, REACH)
+        assert found.delivered == pytest.approx(known.resolved.delivered, abs=1e-4)  # of steps of a 150th of an impact
 
 
 def test_a_restitution_that_depends_on_an_unknown_mass_is_not_told() -> None:
@@ -132,7 +133,8 @@ def test_every_operation_of_the_language_is_composed() -> None:
 
 
 # Friction -------------------------------------------------------------------------------------------------------------
-COULOMB = "mu*(3*min(slip/v,1) - min(slip/v,1)^3)/2 + (m - mu)*max(0,min(1,(slip - v)/(w - v)))^2*(3 - 2*max(0,min(1,(slip - v)/(w - v))))"
+RISE, FALL = "min(slip/v, 1)", "max(0, min(1, (slip - v)/(w - v)))"
+COULOMB = f"mu*(3*{RISE} - {RISE}^3)/2 + (m - mu)*{FALL}^2*(3 - 2*{FALL})"
 SLIDING: dict[str, tuple[dict[str, Any], str, dict[str, Any]]] = {
     "modified-coulomb": (
         {"static": 0.15, "dynamic": 0.1, "v_static": 1e-3, "v_dynamic": 0.01},
@@ -190,10 +192,13 @@ def test_a_coefficient_may_depend_on_the_normal_force() -> None:
     ],
 )
 def test_impossible_coefficients_are_refused_in_words(coefficient: str, values: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+    def tried() -> None:
         own = friction(coefficient, **values)
         own.check()
         check(own)
+
+    with pytest.raises(ValueError, match=words):
+        tried()
 
 
 # Bad input ------------------------------------------------------------------------------------------------------------
@@ -227,10 +232,14 @@ K, K15 = {"K": "1e6 N/m"}, {"K": "1e9 N/m^1.5"}
 def test_impossible_forces_are_refused_in_words(force: str, keys: dict[str, Any], words: str) -> None:
     values = dict(keys)
     restitution = values.pop("restitution", None)
-    with pytest.raises((ValueError, ValidationError), match=words):
+
+    def tried() -> None:
         own = written(force, restitution, **values)
         own.check()
         resolve(own, MASS, REACH)
+
+    with pytest.raises(ValueError, match=words):
+        tried()
 
 
 def test_a_restitution_that_the_expression_misses_is_a_warning() -> None:
@@ -259,11 +268,11 @@ def socket(**changes: Any) -> Any:
 
 def test_scenes_place_their_expressions_errors() -> None:
     normal = {"law": "expression", "force": "K*depth", "values": {"K": 1e6}}
-    with pytest.raises(InputError, match="joint.contact: normal.force = 'K\\*depth': its value is in m"):
+    with pytest.raises(InputError, match=r"joint.contact: normal.force = 'K\*depth': its value is in m"):
         socket(**{"joint.contact.normal": normal})
     stop = {"joint": "hinge", "lower": "-1 deg", "normal": normal | {"values": {"K": "1e6 N/m"}}}
-    with pytest.raises(InputError, match="stop.end: normal.force = 'K\\*depth': its value is in .*but a torque"):
-        load_scene(TREE / "scenes/checks/pendulum.toml", override={"stop.end": stop | {"joint": "pivot"}})
+    with pytest.raises(InputError, match=r"stop.end: normal.force = 'K\*depth': its value is in .*but a torque"):
+        load_scene(TREE / "scenes/checks/pendulum.toml", override={"stop.end": stop})
     bearing = {"law": "expression", "coefficient": "tanh(slip/1 m/s)*1 N/(1 N + normal_force)", "radius": "1 mm"}
     with pytest.raises(InputError, match="slip alone: its coefficient has no normal_force"):
-        load_scene(TREE / "scenes/checks/pendulum.toml", override={"joint.pivot.friction": bearing})
+        load_scene(TREE / "scenes/checks/pendulum.toml", override={"joint.hinge.friction": bearing})

@@ -9,8 +9,8 @@ import numpy as np
 from flexclear.dynamics.kernels import kernel
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(20)
-#: places in an interval of length 1, and weights: Gauss's formula in the third root of the penetration, which integrates
-#: powers, whole or broken, to rounding
+#: places in an interval of length 1, and weights: Gauss's formula in the third root of the penetration, which
+#: integrates powers, whole or broken, to rounding
 NODES = tuple(
     (u**3, 3.0 * u**2 * w) for u, w in zip((0.5 + 0.5 * _POINTS).tolist(), (0.5 * _WEIGHTS).tolist(), strict=True)
 )

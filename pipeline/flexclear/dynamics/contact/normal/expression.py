@@ -89,7 +89,7 @@ def kinks(kind: str, values: tuple[float, ...], reach: float) -> list[float]:
 
 @lru_cache(maxsize=1024)
 def rebound(kind: str, values: tuple[float, ...], mass: float, speed: float) -> float:
-    """Return rebound over approach speed of a free impact, to some five digits.
+    """Return rebound over approach speed of a free impact, to some four digits.
 
     Runge-Kutta steps of a fraction of the time that an elastic impact of this speed takes.
     """
@@ -100,17 +100,20 @@ def rebound(kind: str, values: tuple[float, ...], mass: float, speed: float) -> 
         deepest *= 1.5
         if deepest > 1e9:
             return 0.0  # nothing stops it
-    h, d, v = 0.005 * deepest / speed, np.float64(0.0), np.float64(speed)
+    h, d, v, before = 0.02 * deepest / speed, np.float64(0.0), np.float64(speed), (0.0, speed)
 
     def slope(d: Any, v: Any) -> Any:
         return -max(0.0, whole(max(0.0, d), v, speed, values)) / mass
 
-    for _ in range(20_000):
+    for _ in range(5_000):
         k1 = slope(d, v)
+        if v < 0.0 and (k1 == 0.0 or d <= 0.0):
+            pull = min(0.0, whole(max(0.0, d), v, speed, values)) / mass
+            share = before[0] / (before[0] - pull) if before[0] > pull else 1.0  # of the step in which the force ended
+            return float(-(before[1] + share * (v - before[1])) / speed)
+        before = (-k1, v)
         k2 = slope(d + 0.5 * h * v, v + 0.5 * h * k1)
         k3 = slope(d + 0.5 * h * v + 0.25 * h * h * k1, v + 0.5 * h * k2)
         k4 = slope(d + h * v + 0.5 * h * h * k2, v + h * k3)
         d, v = d + h * v + h * h * (k1 + k2 + k3) / 6.0, v + h * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
-        if v < 0.0 and (d <= 0.0 or whole(d, v, speed, values) <= 0.0):
-            return float(-v / speed)
     return 0.0
