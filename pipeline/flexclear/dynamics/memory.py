@@ -236,9 +236,11 @@ BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port, r moving shapes: translation (3r), rotation (3r); with stiffening 6 (r r)
-#: radius: of the inner surface; stiffness, exponent, damping: of the normal law (`contact.law.Numbers`); shape: further
-#: numbers of its kind of surfaces; length: size of the mechanism that it belongs to
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed stiffness exponent damping friction_law:6 shape:2 length")
+#: radius: of the inner surface; stiffness, exponent, damping, values: of the normal law (`contact.law.Numbers`); shape:
+#: further numbers of its kind of surfaces; length: size of the mechanism that it belongs to
+CONTACT_NUMBERS = numbers(
+    "clearance radius floor stick_speed stiffness exponent damping values:12 friction_law:6 shape:2 length"
+)
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
 LOAD_NUMBERS = numbers("value")  # see `loads`

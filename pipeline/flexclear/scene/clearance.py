@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeA
 
 from pydantic import Field, create_model, model_validator
 
+from flexclear.scene import law_expressions
 from flexclear.scene.fields import Force, FrameName, Length, Mass, Number, Part, Positive, Pressure, Speed
+from flexclear.scene.laws import Value
 
 Share = Field(ge=0.0, le=1.0)
 
@@ -49,13 +51,49 @@ class _Normal(Part):
         """True when the damping follows from the mass that rebounds, and none is given."""
         return False
 
+    @property
+    def needs_materials(self) -> bool:
+        """True when the elastic force follows from materials and radii."""
+        return self.stiffness is None
 
-class Hertz(_Normal):
+
+class Layer(Part):
+    """Elastic layer on a rigid surface."""
+
+    modulus: Annotated[Pressure, Positive]
+    """pressure over strain of the layer, which cannot spread sideways: E (1 - nu) / ((1 + nu) (1 - 2 nu))"""
+    thickness: Annotated[Length, Positive]
+    """thickness of the layer"""
+
+
+class _Elastic(_Normal):
+    """Keys of laws whose elastic force may be that of a tight fit."""
+
+    exponent: Annotated[Number, Field(ge=1.0)] = 1.5
+    """exponent of the penetration"""
+    form: Literal["johnson", "radzimovsky", "goldsmith", "esdu-78035", "liu", "pereira", "winkler"] | None = None
+    """elastic force of a tight fit, from radii and materials; default: a power of the penetration"""
+    layer: Layer | None = None
+    """elastic layer between the surfaces, for the form 'winkler'"""
+
+    @model_validator(mode="after")
+    def _one_elastic_force(self) -> Self:
+        if self.form is not None and (self.stiffness is not None or self.exponent != 1.5):
+            raise ValueError(f"the form '{self.form}' has its own stiffness; leave out stiffness and exponent")
+        if (self.form == "winkler") != (self.layer is not None):
+            raise ValueError("the form 'winkler' and layer = { modulus, thickness } belong together; give both")
+        return self
+
+    @property
+    def needs_materials(self) -> bool:
+        """True when the elastic force follows from materials and radii."""
+        return self.stiffness is None and self.layer is None
+
+
+class Hertz(_Elastic):
     """Elastic contact without loss."""
 
     law: Literal["hertz"]
-    exponent: Annotated[Number, Field(ge=1.0)] = 1.5
-    """exponent of the penetration"""
 
     @model_validator(mode="after")
     def _lossless(self) -> Self:
@@ -67,7 +105,7 @@ class Hertz(_Normal):
         return self
 
 
-class Hysteretic(_Normal):
+class Hysteretic(_Elastic):
     """Hertzian contact with a damping in proportion to the elastic force, by the law's factor for the restitution."""
 
     law: Literal[
@@ -82,8 +120,6 @@ class Hysteretic(_Normal):
         "carvalho-martins",
     ]
     """name of the law, as docs/contact.md lists them"""
-    exponent: Annotated[Number, Field(ge=1.0)] = 1.5
-    """exponent of the penetration"""
 
     @model_validator(mode="after")
     def _damped(self) -> Self:
@@ -117,12 +153,56 @@ class KelvinVoigt(_Normal):
         return self
 
 
-NormalLaw = Annotated[Hertz | Hysteretic | KelvinVoigt, Field(discriminator="law")]
+class NormalExpression(Part):
+    """A law of one's own: the normal force as an expression, which is never negative where the run uses it.
+
+    Variables are the penetration `depth`, its rate, and `impact_rate`, the rate at which this contact began. What the
+    force is at rate 0 is stored, the rest is damping.
+    """
+
+    law: Literal["expression"]
+    force: str
+    """the expression, as ``K*depth^1.5*(1 + a*rate/impact_rate)``"""
+    values: dict[str, Value] = Field(default_factory=dict)
+    """named constants of the expression, each a number or text with its unit"""
+    restitution: Annotated[Number, Share] | None = None
+    """restitution that the damping is meant to cause; the expression may contain it"""
+
+    stiffness: ClassVar[None] = None
+    needs_mass: ClassVar[bool] = False
+    needs_materials: ClassVar[bool] = False
+
+    @property
+    def named(self) -> dict[str, Any]:
+        """Named values of the expression, the restitution last."""
+        return self.values | ({} if self.restitution is None else {"restitution": self.restitution})
+
+    @property
+    def encoded(self) -> tuple[str, tuple[float, ...]]:
+        """Structure and values of the expression (`scene.law_expressions`)."""
+        return law_expressions.encoded(self.force, self.named, law_expressions.NORMAL)
+
+    def check(self, *, turning: bool = False) -> None:
+        """Raise ValueError, in words, for an expression without meaning. turning: for the end of an angle."""
+        variables, dimension = (law_expressions.ANGULAR, "torque") if turning else (law_expressions.NORMAL, "force")
+        law_expressions.check("normal.force", self.force, self.named, variables, dimension)
+
+
+NormalLaw = Annotated[Hertz | Hysteretic | KelvinVoigt | NormalExpression, Field(discriminator="law")]
 #: all kinds of normal laws
 NORMALS: tuple[Any, ...] = get_args(get_args(NormalLaw)[0])
 
 
-class ModifiedCoulomb(Part):
+class _Friction(Part):
+    """What all friction laws have; `kind`: by which code is composed."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the law, with the structure of its expression."""
+        return str(self.law)  # type: ignore[attr-defined]
+
+
+class ModifiedCoulomb(_Friction):
     """Wang & Wang's modified Coulomb friction, with its four parameters (Table 6)."""
 
     law: Literal["modified-coulomb"]
@@ -146,7 +226,7 @@ class ModifiedCoulomb(Part):
         return self
 
 
-class Ambrosio(Part):
+class Ambrosio(_Friction):
     """Ambrosio's Coulomb friction: none below v0, a linear rise to `dynamic` at v1."""
 
     law: Literal["ambrosio"]
@@ -167,7 +247,7 @@ class Ambrosio(Part):
         return self
 
 
-class LuGre(Part):
+class LuGre(_Friction):
     """LuGre friction per unit of normal force."""
 
     law: Literal["lugre"]
@@ -198,7 +278,31 @@ class LuGre(Part):
         return self
 
 
-Friction = Annotated[ModifiedCoulomb | Ambrosio | LuGre, Field(discriminator="law")]
+class FrictionExpression(_Friction):
+    """A law of one's own: the coefficient of friction as an expression of the sliding speed and the normal force."""
+
+    law: Literal["expression"]
+    coefficient: str
+    """the expression of `slip` and `normal_force`, zero at rest, as ``mu*tanh(slip/v)``"""
+    values: dict[str, Value] = Field(default_factory=dict)
+    """named constants of the expression, each a number or text with its unit"""
+
+    @property
+    def encoded(self) -> tuple[str, tuple[float, ...]]:
+        """Structure and values of the expression (`scene.law_expressions`)."""
+        return law_expressions.encoded(self.coefficient, self.values, law_expressions.SLIDING)
+
+    @property
+    def kind(self) -> str:
+        """Structure of the expression."""
+        return self.encoded[0]
+
+    def check(self) -> None:
+        """Raise ValueError, in words, for an expression without meaning."""
+        law_expressions.check("friction.coefficient", self.coefficient, self.values, law_expressions.SLIDING, "number")
+
+
+Friction = Annotated[ModifiedCoulomb | Ambrosio | LuGre | FrictionExpression, Field(discriminator="law")]
 #: all friction laws
 FRICTIONS: tuple[Any, ...] = get_args(get_args(Friction)[0])
 
@@ -255,7 +359,7 @@ class _Contact(Part):
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> Self:
-        if self.normal.stiffness is None and None in self.materials:
+        if self.normal.needs_materials and None in self.materials:
             names = " and ".join(f"{surface}_material" for surface in self.surfaces)
             raise ValueError(f"the contact stiffness is unknown: give {names}, or normal.stiffness")
         return self
@@ -416,6 +520,8 @@ def require_fitting(kind: str, friction: Any) -> None:
     if kind not in SIZES:
         known = ", ".join(SIZES)
         raise ValueError(f"a joint of type '{kind}' has no friction of its own; those that have: {known}")
+    if "x1" in friction.kind.split(","):
+        raise ValueError("friction of an ideal joint depends on the slip alone: its coefficient has no normal_force")
     possible, needed = SIZES[kind]
     given = {name for name in ("radius", "length", "axial_radius") if getattr(friction, name) is not None}
     for name in sorted(needed - given):

@@ -44,6 +44,16 @@ class Lookup:
     value: str
 
 
+@dataclass(frozen=True)
+class Local:
+    """A name that exists only in loads of one kind: its letter and SI unit."""
+
+    letter: str
+    unit: str
+    dim: str = ""
+    over_time: bool = True
+
+
 def operands_of(step: Any) -> int:
     """Return the number of operands of a step that is no name of an operator: 0 for a leaf."""
     return len(step.of) if isinstance(step, Lookup) else 0
@@ -77,6 +87,36 @@ def measure(steps: Sequence[Any]) -> tuple[units.Exponents, str]:
 def with_name(text: str, name: str, other: str) -> str:
     """Return the expression with another text wherever it contains a name."""
     return _TOKEN.sub(lambda token: f" {other} " if token["name"] == name else token[0], text)
+
+
+def constants_of(values: Mapping[str, Any], taken: Iterable[str] = ("length", "rate")) -> dict[str, tuple[float, str]]:
+    """Return value and SI unit of named constants; raise ValueError for an invalid name. taken: names of quantities."""
+    known = {}
+    for name, value in values.items():
+        if not re.fullmatch(r"[^\W\d]\w*", name) or name in (*FUNCTIONS, *SEVERAL, "t", "time", "pi", *taken):
+            raise ValueError(
+                f"values.{name}: '{name}' cannot name a constant: choose letters, digits and _, but no function, "
+                + re.sub(", (\\w+)$", r" or \1", ", ".join(("t", "pi", *taken)))
+            )
+        number, _, unit = value.partition(" ") if isinstance(value, str) else (value, "", "1")
+        known[name] = float(number), unit
+    return known
+
+
+def require_used(known: Iterable[str], texts: Sequence[str], family: str = "values") -> None:
+    """Raise ValueError for a constant, or a table, that no text uses."""
+    for name in known:
+        if not any(re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) for text in texts):
+            raise ValueError(f"{family}.{name} is not used: remove it, or name it in the expression")
+
+
+def refuse_jump(step: Any) -> None:
+    """Raise ValueError for a function that jumps."""
+    if step in JUMPING:
+        raise ValueError(
+            f"{step}(...) jumps, and integration steps cannot cross a jump: write a steep tanh(...), or a ramp of "
+            "min(...) and max(...)"
+        )
 
 
 def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) -> None:
@@ -254,9 +294,11 @@ def _lookup(name: str, values: list[list[Any]], tables: Mapping[str, Lookup] | N
     return [step for one in values for step in one] + [tables[name]]
 
 
-def _exponent(text: str, steps: list[Any]) -> tuple[float, str]:
+def _exponent(text: str, steps: list[Any]) -> Any:
     if not all(isinstance(step, (tuple, str)) for step in steps) or measure(steps) != (NUMBER, ""):
         raise ValueError(f"'{text}': an exponent is a number without unit, as in x^1.5")
+    if len(steps) == 1:
+        return steps[0]  # a named constant stays one
     return fold(steps, lambda leaf: float(leaf[0]), _number), "1"
 
 

@@ -8,21 +8,21 @@ and share compiled code.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from flexclear.scene.expression import (
     BENT,
-    FUNCTIONS,
-    JUMPING,
     OPERANDS,
-    SEVERAL,
+    Local,
     Lookup,
     check_unit,
+    constants_of,
     fold,
     measure,
+    refuse_jump,
+    require_used,
 )
 from flexclear.scene.loads import EXPRESSIONS, JointExpression, LineExpression, PointExpression
 from flexclear.scene.owners import turns
@@ -45,16 +45,6 @@ READ = {
 VECTORS = "pvo"
 #: largest exponent computed by multiplication
 WHOLE = 8
-
-
-@dataclass(frozen=True)
-class Local:
-    """A name that exists only in loads of one kind: its letter and SI unit."""
-
-    letter: str
-    unit: str
-    dim: str = ""
-    over_time: bool = True
 
 
 #: names that an expression along a line may use
@@ -110,7 +100,7 @@ def formula(scene: Any, name: str) -> Formula | None:
 
 def expressions_of_load(scene: Any, load: Any) -> Iterator[tuple[str, list[Any]]]:
     """Yield each expression of a load, and its postfix order; raise ValueError, in words, for one without meaning."""
-    known, local = constants_of(load.values), OF_LINES if isinstance(load, LineExpression) else None
+    known, local = constants_of(load.values, OF_LINES), OF_LINES if isinstance(load, LineExpression) else None
     require_used(known, load.texts)
     require_used(load.tables, load.texts, "tables")
     tables = {name: _lookup(name, one) for name, one in load.tables.items()}
@@ -133,36 +123,27 @@ def check_formulas(scene: Any) -> None:
             formula(scene, name)
         except ValueError as error:
             raise ValueError(f"load.{name}: {error}") from None
+    for path, law, turning in laws_by_expression(scene):
+        try:
+            law.check(**turning)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
 
 
-def constants_of(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
-    """Return value and SI unit of named constants; raise ValueError for an invalid name."""
-    known = {}
-    for name, value in values.items():
-        if not re.fullmatch(r"[^\W\d]\w*", name) or name in (*FUNCTIONS, *SEVERAL, "t", "time", "pi", *OF_LINES):
-            raise ValueError(
-                f"values.{name}: '{name}' cannot name a constant: choose letters, digits and _, but no function, t, "
-                "pi, length or rate"
-            )
-        number, _, unit = value.partition(" ") if isinstance(value, str) else (value, "", "1")
-        known[name] = float(number), unit
-    return known
-
-
-def require_used(known: Iterable[str], texts: Sequence[str], family: str = "values") -> None:
-    """Raise ValueError for a constant, or a table, that no text uses."""
-    for name in known:
-        if not any(re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) for text in texts):
-            raise ValueError(f"{family}.{name} is not used: remove it, or name it in the expression")
+def laws_by_expression(scene: Any) -> Iterator[tuple[str, Any, dict[str, bool]]]:
+    """Yield each contact law by an expression: where it is, the law, and for a stop whether it ends an angle."""
+    for name, joint in scene.joint.items():
+        for law in (getattr(joint, "normal", None), joint.friction):
+            if law is not None and law.law == "expression":
+                yield f"joint.{name}", law, {}
+    for name, stop in scene.stop.items():
+        if stop.normal.law == "expression":
+            yield f"stop.{name}", stop.normal, {"turning": turns(scene, stop)}
 
 
 def _check(scene: Any, step: Any) -> None:
     """Raise ValueError for a step that no load can compute."""
-    if step in JUMPING:
-        raise ValueError(
-            f"{step}(...) jumps, and integration steps cannot cross a jump: write a steep tanh(...), or a ramp of "
-            "min(...) and max(...)"
-        )
+    refuse_jump(step)
     if not isinstance(step, Quantity):
         return
     if step.kind not in READ:

@@ -18,12 +18,14 @@ RESTITUTION_ERROR = 0.05
 class Numbers(NamedTuple):
     """Numbers of a normal law for its form; CONTACT_NUMBERS has the same fields.
 
-    stiffness: K [N/m^n].  damping: C [N s/m], or the hysteresis factor; 0 for a law without loss.
+    stiffness: K [N/m^n].  damping: C [N s/m], or the hysteresis factor; 0 for a law without loss.  values: further ones
+    of the form.
     """
 
     stiffness: float
     exponent: float
     damping: float
+    values: tuple[float, ...] = (0.0,) * 12
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Resolved:
 
     parameter: the law's own coefficient of restitution, or None.  delivered: the rebound over the
     approach speed of a free impact, None where it depends on a mass that is unknown.  warning: in words, when the law
-    is used outside its range.
+    is used outside its range.  deepest: penetration up to which the elastic force holds [m or rad].
     """
 
     form: str
@@ -40,6 +42,7 @@ class Resolved:
     parameter: float | None
     delivered: float | None
     warning: str | None = None
+    deepest: float = inf
 
     def depth(self, force: float) -> float:
         """Return the penetration [m or rad] whose elastic force is `force` [N or N m], >= 0."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from math import e
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexclear.dynamics.contact.form.logarithmic import LIMIT_DEPTH
 from flexclear.dynamics.contact.surfaces import SURFACES
 from flexclear.system.errors import SolverError
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 SMALL_CONTACT = 0.3
 #: penetration, as a fraction of the inner radius, above which no contact law holds
 SHALLOW = 0.1
+#: penetrations over the clearance up to which these forms hold
+JOHNSON, ESDU = 4.0 * LIMIT_DEPTH / e**2, 4.0 * LIMIT_DEPTH
 #: moments below this fraction of the weight times the size of a mechanism tilt no pin
 NO_MOMENT = 1e-6
 
@@ -32,10 +36,17 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
         return found  # the end of a coordinate has no surfaces
     surfaces = SURFACES[joint.type]
     size = surfaces.contact_size(joint, depth, force)
-    if joint.normal.stiffness is None and size > SMALL_CONTACT * joint.radius:
+    form = getattr(joint.normal, "form", None)
+    if joint.normal.needs_materials and form is None and size > SMALL_CONTACT * joint.radius:
         found.append(
             f"{name}: the contact radius reaches {size:.3g} m, {size / joint.radius:.2g} of the inner "
             f"surface's radius; the stiffness from radii and materials (Hertz) holds below {SMALL_CONTACT:g}"
+            f"{_instead(joint, depth)}"
+        )
+    if depth > law.deepest:
+        found.append(
+            f"{name}: the penetration reaches {depth:.3g} m, but the form '{form}' holds to {law.deepest:.3g} m"
+            f"{_instead(joint, depth)}"
         )
     if depth > SHALLOW * joint.radius:
         found.append(
@@ -44,6 +55,16 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
             "choose a stiffer contact, a slower impact or smaller loads"
         )
     return found
+
+
+def _instead(joint: Any, depth: float) -> str:
+    """Return the form of a tight fit that holds at a penetration [m], as a remedy; empty where none does."""
+    if joint.type == "clearance-spherical":
+        return "; for a lined socket normal.form = 'winkler' holds"
+    if joint.type != "clearance-revolute" or joint.normal.needs_materials is False:
+        return ""
+    form = "johnson" if depth < JOHNSON * joint.clearance else "esdu-78035" if depth < ESDU * joint.clearance else "liu"
+    return f"; of a tight fit, normal.form = '{form}' does"
 
 
 def tilting(name: str, joint: Any, moment: float, force: float) -> str:
@@ -101,8 +122,9 @@ def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resol
     found = {
         name: {
             "law": joint.normal.law,
-            "exponent": law.numbers.exponent,
-            "stiffness": law.numbers.stiffness,
+            **({"form": joint.normal.form} if getattr(joint.normal, "form", None) else {}),
+            "exponent": law.numbers.exponent if law.numbers.stiffness else None,
+            "stiffness": law.numbers.stiffness or None,
             "restitution_parameter": law.parameter,
             "delivered_restitution": law.delivered,
             "friction": None if joint.friction is None else joint.friction.law,

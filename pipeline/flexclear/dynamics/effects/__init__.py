@@ -89,7 +89,7 @@ def most_parts(scene: Scene) -> Parts:
         joints=tuple(sorted({"free", *ideal, *chained})),
         surfaces=tuple(sorted({joint.type for joint in contacts.values()})),
         forms=FORMS if _touches(scene) else (),
-        frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
+        frictions=tuple(sorted({j.friction.kind for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),
         effects=tuple(sorted(" ".join([name, *known]) for name, known in kinds.items() if known is not None)),
         closures=_loops(scene),

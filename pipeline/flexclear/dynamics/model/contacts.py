@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact.conforming import CONFORMING
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
-from flexclear.dynamics.contact.normal import NORMAL_LAWS
+from flexclear.dynamics.contact.friction.expression import check
+from flexclear.dynamics.contact.normal import NORMAL_LAWS, expression
 from flexclear.dynamics.contact.surfaces import SURFACES
+from flexclear.dynamics.contact.validity import SHALLOW
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.model.components import Floors, Group
 from flexclear.dynamics.model.gauges import Gauges
@@ -33,7 +37,16 @@ SitePairs = Sequence[tuple[int, int]]
 
 def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
     """Return the normal law of each contact with its numbers; raise InputError for a law with impossible values."""
+    together(partial(_check_friction, name, joint.friction) for name, joint in mechanism.scene.joint.items())
     return tuple(together(partial(resolve_one, mechanism, contact) for contact in mechanism.contacts))
+
+
+def _check_friction(name: str, friction: Any) -> None:
+    if friction is not None and friction.law == "expression":
+        try:
+            check(friction)
+        except ValueError as error:
+            raise InputError(f"[joint.{name}.friction]", str(error)) from None
 
 
 def fill(
@@ -51,7 +64,7 @@ def fill(
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
         if joint.friction is not None:
             friction = friction_law(joint)
-            friction_kind = parts.frictions.index(joint.friction.law)
+            friction_kind = parts.frictions.index(joint.friction.kind)
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
         if isinstance(joint, End):
             surfaces, shape = gauges.add(*sites, joint.coordinate, counts=True), (joint.limit, joint.sense)
@@ -62,7 +75,7 @@ def fill(
         rows.append((*sites, *kinds_of, first if bends else -1))
         first += 3 * bends
         sizes = (joint.clearance, joint.radius, _floor(joint, length))
-        reals.append([*sizes, stick, *law.numbers, *numbers, *shape, length])
+        reals.append([*sizes, stick, *law.numbers[:3], *law.numbers.values, *numbers, *shape, length])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 
@@ -91,7 +104,7 @@ def _floor(joint: Clearance | End, length: float) -> float:
 
 def friction_law(joint: Any) -> Any:
     """Return the friction law of a joint with friction."""
-    return FRICTION_LAWS[joint.friction.law]
+    return FRICTION_LAWS[joint.friction.kind]
 
 
 def bristle(name: str, joint: Any) -> float | None:
@@ -124,12 +137,20 @@ def resolve_law(joint: Clearance | End, mass: float | None, path: str) -> Resolv
     """
     normal, stiffness = joint.normal, joint.normal.stiffness
     try:
-        if not isinstance(joint, End):
+        if normal.law == "expression":
+            return expression.resolve(normal, mass, SHALLOW * joint.radius or joint.clearance)
+        tight = CONFORMING[normal.form](joint) if getattr(normal, "form", None) else None
+        if tight is not None:
+            stiffness = tight.stiffness
+        elif not isinstance(joint, End):
             stiffness = SURFACES[joint.type].stiffness(joint, normal.exponent)
         law: Resolved = NORMAL_LAWS[normal.law](normal, stiffness, mass)
     except ValueError as error:
         raise InputError(path, str(error)) from None
-    return law
+    if tight is None:
+        return law
+    numbers = law.numbers._replace(exponent=tight.exponent, values=(*tight.values, *law.numbers.values)[:12])
+    return replace(law, form=tight.form or law.form, numbers=numbers, deepest=tight.deepest)
 
 
 def _reduced_mass(masses: Sequence[float]) -> float | None:

@@ -72,7 +72,7 @@ def fill(filling: Filling) -> dict[str, Any]:
         tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges, *where))
         for kind, side, axis in BEARINGS[joint.type]:
             size = bristle(name, joint)
-            law = laws.index(joint.friction.law) if joint.friction is not None else -1
+            law = laws.index(joint.friction.kind) if joint.friction is not None else -1
             tables["bearings"].append((number, kind, law, side, axis, slot if size is not None else -1))
             tables["bearing_numbers"].append(_numbers(name, joint, kind))
             slot += 3 if size is not None else 0

@@ -7,6 +7,27 @@ Each module has the kernels ``force(depth, rate, impact_rate, law) -> (elastic, 
 
 from __future__ import annotations
 
-from flexclear.dynamics.contact.form import elastic, hysteretic, linear_damper
+from flexclear.dynamics.contact.expression import Laws
+from flexclear.dynamics.contact.form import (
+    elastic,
+    expression,
+    hysteretic,
+    layer_round_ball,
+    layer_round_pin,
+    linear_damper,
+    liu,
+    logarithmic,
+)
 
-FORMS = {"elastic": elastic, "hysteretic": hysteretic, "linear-damper": linear_damper}
+FORMS = Laws(
+    {
+        "elastic": elastic,
+        "hysteretic": hysteretic,
+        "linear-damper": linear_damper,
+        "logarithmic": logarithmic,
+        "liu": liu,
+        "layer-round-pin": layer_round_pin,
+        "layer-round-ball": layer_round_ball,
+    },
+    expression.form_of,
+)

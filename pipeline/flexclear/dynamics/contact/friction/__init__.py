@@ -6,10 +6,14 @@ A joint without friction names none.
 
 from __future__ import annotations
 
-from flexclear.dynamics.contact.friction import ambrosio, lugre, modified_coulomb
+from flexclear.dynamics.contact.expression import Laws
+from flexclear.dynamics.contact.friction import ambrosio, expression, lugre, modified_coulomb
 
-FRICTION_LAWS = {
-    "modified-coulomb": modified_coulomb.LAW,
-    "ambrosio": ambrosio.LAW,
-    "lugre": lugre.LAW,
-}
+FRICTION_LAWS = Laws(
+    {
+        "modified-coulomb": modified_coulomb.LAW,
+        "ambrosio": ambrosio.LAW,
+        "lugre": lugre.LAW,
+    },
+    expression.law_of,
+)

@@ -44,10 +44,20 @@ def sliding(coefficient: Callable) -> Callable:
     """Build `traction` of a law whose force is the normal force times coefficient(speed, p) >= 0."""
 
     @kernel
+    def of_speed(speed, f_n, _, p):
+        return coefficient(speed, p)
+
+    return sliding_under(of_speed)
+
+
+def sliding_under(coefficient: Callable) -> Callable:
+    """Build `traction` of a law with coefficient(speed, normal force, 0, p) >= 0."""
+
+    @kernel
     def traction(z, slip, f_n, p):
         square = dot(slip, slip)
         speed = max(np.sqrt(square), SLOWEST)
-        per_speed = f_n * coefficient(speed, p) / speed
+        per_speed = f_n * coefficient(speed, f_n, 0.0, p) / speed
         return scale(-per_speed, slip), per_speed * square, 0.0, (0.0, 0.0, 0.0)
 
     return traction

@@ -1,0 +1,63 @@
+r"""Force of two cylinders whose compression is :math:`\delta = cF\ln(G/F)`, beyond a limit a straight line.
+
+The formula has its largest compression :math:`\delta_m = cG/e` at :math:`F = G/e`, where its stiffness is infinite.
+From half that force on the force goes on along its tangent. With :math:`F = (G/e)e^{-u}`, :math:`u - \ln(1+u) =
+-\ln(\delta/\delta_m)`, which Newton's method solves to rounding from a bound of the root.
+Source: Chatzigeorgiou (2013), IEEE Communications Letters 17, 1505-1508, of Lambert's function.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexclear.dynamics.contact.form.damped import damped
+from flexclear.dynamics.kernels import kernel
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.contact.law import Numbers
+
+#: u at the limit, and the compression there as a fraction of the largest
+LIMIT = float(np.log(2.0))
+LIMIT_DEPTH = 0.5 * (1.0 + LIMIT)
+
+
+@kernel
+def exponent(ratio):
+    """Return u for a compression over the largest, at most LIMIT_DEPTH."""
+    level = -np.log(ratio)
+    u = np.sqrt(2.0 * level) + 0.8 * level
+    for _ in range(4):
+        u = u - (u - np.log(1.0 + u) - level) * (1.0 + u) / u
+    return u
+
+
+@kernel
+def elastic(depth, law):
+    """Return the elastic force [N]; the law's values are the largest compression [m] and the force there [N]."""
+    if depth <= 0.0:
+        return 0.0
+    ratio = depth / law.values[0]
+    if ratio > LIMIT_DEPTH:
+        return law.values[1] * (0.5 + (ratio - LIMIT_DEPTH) / LIMIT)
+    return law.values[1] * np.exp(-exponent(ratio))
+
+
+force = damped(elastic)
+
+
+@kernel
+def stored(depth, law):
+    """Return the stored energy [J]."""
+    ratio = min(depth / law.values[0], LIMIT_DEPTH)
+    y, over = elastic(ratio * law.values[0], law) / law.values[1], depth / law.values[0] - ratio
+    return law.values[0] * law.values[1] * (0.5 * y * ratio - 0.25 * y * y + over * (0.5 + 0.5 * over / LIMIT))
+
+
+def depth(force: float, law: Numbers) -> float:
+    """Return the depth [m] at which the elastic force is `force` [N]."""
+    y = force / law.values[1]
+    if y > 0.5:
+        return float(law.values[0] * (LIMIT_DEPTH + (y - 0.5) * LIMIT))
+    return float(law.values[0] * y * (1.0 - np.log(y))) if y > 0.0 else 0.0

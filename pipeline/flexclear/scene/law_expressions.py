@@ -1,0 +1,79 @@
+"""Expressions of contact laws, in the form from which kernels are composed: structure as text, named values separately.
+
+The text is the expression in postfix order, behind "expression", separated by commas: ``x0`` is its first variable,
+``c0`` its first named value, ``^1.5`` a power; other numbers are written out. Laws that differ in values only have the
+same text, and share compiled code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+from flexclear.scene.expression import (
+    Local,
+    check_unit,
+    constants_of,
+    fold,
+    measure,
+    postfix,
+    refuse_jump,
+    require_used,
+)
+
+#: variables of the normal force, at the end of an angle too, and of a coefficient of friction
+NORMAL = {"depth": Local("x0", "m"), "rate": Local("x1", "m/s"), "impact_rate": Local("x2", "m/s")}
+ANGULAR = {"depth": Local("x0", "rad"), "rate": Local("x1", "rad/s"), "impact_rate": Local("x2", "rad/s")}
+SLIDING = {"slip": Local("x0", "m/s"), "normal_force": Local("x1", "N")}
+#: most named values of an expression for a normal force, and of one for a coefficient of friction
+MOST_NORMAL, MOST_SLIDING = 10, 6
+
+
+def encoded(text: str, values: Mapping[str, Any], variables: Mapping[str, Local]) -> tuple[str, tuple[float, ...]]:
+    """Return structure and values of an expression; raise ValueError, in words, for one without meaning."""
+    return _encoded(text, tuple(values.items()), tuple(variables.items()))[:2]
+
+
+def check(key: str, text: str, values: Mapping[str, Any], variables: Mapping[str, Local], dimension: str) -> None:
+    """Raise ValueError, in words, for an expression without meaning or of another dimension than its law."""
+    try:
+        _, numbers, steps = _encoded(text, tuple(values.items()), tuple(variables.items()))
+        check_unit(steps, dimension)
+    except ValueError as error:
+        raise ValueError(f"{key} = '{text}': {error}") from None
+    most = MOST_SLIDING if variables is SLIDING else MOST_NORMAL
+    if len(numbers) > most:
+        raise ValueError(f"{key} = '{text}': it has {len(numbers)} values, at most {most}: write numbers for others")
+
+
+@lru_cache(maxsize=256)
+def _encoded(
+    text: str, given: tuple[tuple[str, Any], ...], variables: tuple[tuple[str, Local], ...]
+) -> tuple[str, tuple[float, ...], tuple[Any, ...]]:
+    known = dict(variables)
+    constants = constants_of({name: value for name, value in given if name != "restitution"}, (*known, "restitution"))
+    require_used(constants, (text,))
+    constants |= {name: (float(value), "1") for name, value in given if name == "restitution"}
+
+    def variable(name: str) -> Local:
+        if name not in known:
+            more = ", ".join([*known, *constants])
+            raise ValueError(f"'{name}' is unknown: a contact law depends on its own contact alone, here on {more}")
+        return known[name]
+
+    steps = postfix(text, variable, constants)
+    measure(steps)
+    for step in steps:
+        refuse_jump(step)
+    places = {id(one): f"c{k}" for k, one in enumerate(constants.values())}
+
+    def leaf(step: Any) -> str:
+        return step.letter if isinstance(step, Local) else places.get(id(step), repr(step[0]))
+
+    def apply(operator: str, operands: list[str]) -> str:
+        if operator == "^" and operands[1][0] != "c":
+            return f"{operands[0]},^{operands[1]}"
+        return ",".join([*operands, operator])
+
+    return f"expression,{fold(steps, leaf, apply)}", tuple(value for value, _ in constants.values()), tuple(steps)
