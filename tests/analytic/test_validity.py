@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -246,6 +247,73 @@ def test_a_beam_that_rings_is_judged_between_outputs_a_period_apart(integrator: 
     found = simulated(ringing, bundles(ringing))
     assert float(found.kinetic.max()) < 1e-9 * (omega * size) ** 2  # so the outputs know nothing of it
     assert found.attrs["exchanged_energy"] == pytest.approx(0.5 * (omega * size) ** 2, rel=0.5)
+
+
+ROD = """title = "rod"
+elements = 4
+theory = "euler-bernoulli"
+interfaces = ["root", "tip"]
+shape = {{ type = "straight-beam", length = {length} }}
+material = {{ density = 2e3, youngs_modulus = 7e10, poisson = 0.3 }}
+section = {{ type = "circle", radius = {radius} }}
+frames = {{ root = {{ x = 0 }}, tip = {{ x = {length} }} }}
+"""
+
+
+def bent(
+    folder: Path, mass: float, load: float, solver: dict[str, Any], periods: float = 300.0
+) -> tuple[xr.Dataset, float]:
+    """A clamped rod of a mass [kg] in equilibrium under a force across its tip.
+
+    load: as a fraction of 5 N per kg^(2/3), with which all sizes bend alike.  periods: of its first mode.  Return also
+    the tip's displacement by beam theory, F l^3 / (3 E I).
+    """
+    size = (mass / (np.pi * 2e3 * 0.4 * 0.02**2)) ** (1 / 3)
+    length, radius, force = 0.4 * size, 0.02 * size, 5.0 * size**2 * load
+    end = periods * 2.0 * np.pi / (1.875**2 * (7e10 / 2e3) ** 0.5 * 0.5 * radius / length**2)
+    (folder / "rod.toml").write_text(ROD.format(length=length, radius=radius))
+    rod = {"type": "flexible", "mesh": str(folder / "rod.toml"), "modes": {"reference": "craig-bampton", "count": 8}}
+    bodies = {"ground": {"type": "ground", "frames": {"wall": {}}}, "rod": rod}
+    acting = {"push": {"type": "point-force", "frame": "rod.tip", "force": [0.0, force, 0.0]}}
+    more = {"load": acting, "start": {"at": "equilibrium"}, "output": {"interval": 0.1 * end}, "solver": solver}
+    table = scene(bodies, {"wall": joint("fixed", "ground.wall", "rod.root")}, end, **more)
+    held = Scene.model_validate(table)
+    return simulated(held, bundles(held)), force * length**3 / (3.0 * 7e10 * np.pi * radius**4 / 4.0)
+
+
+@pytest.mark.parametrize("mass", [1e-9, 1.0, 1e3])
+@pytest.mark.parametrize(
+    "load, solver",
+    [
+        (1.0, {"by_need": True}),
+        (1e-3, {"by_need": True}),
+        (1.0, {"by_need": "integrator", "rtol": 1e-9}),
+        (1.0, {"by_need": "integrator", "rtol": 1e-6}),
+        (1.0, {"integrator": "exponential", "rtol": 1e-10}),
+        (1.0, {"integrator": "exponential", "rtol": 1e-7}),
+        (1.0, {"integrator": "radau", "rtol": 1e-7}),
+    ],
+)
+def test_a_rod_of_any_size_is_held_in_equilibrium(
+    tmp_path: Path, mass: float, load: float, solver: dict[str, Any]
+) -> None:
+    """It exchanges no energy: an error far below what it stores is none, and noise of the steps is no motion."""
+    held, expected = bent(tmp_path, mass, load, solver)
+    place = held.frame_position.sel(frame="rod.tip").values[:, 1]
+    np.testing.assert_allclose(place, expected, rtol=1e-3)  # resolved to a thousandth
+
+
+def test_steps_over_many_vibrations_hold_a_rod_at_rest(tmp_path: Path) -> None:
+    """A speed of rounding, taken for a motion through a step of a thousand periods, is no work."""
+    held, expected = bent(tmp_path, 1.0, 1.0, {"integrator": "exponential", "rtol": 1e-8}, 1e5)
+    np.testing.assert_allclose(held.frame_position.sel(frame="rod.tip").values[:, 1], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("mass", [1.0, 1e3])
+def test_noise_as_large_as_the_state_it_disturbs_is_refused(tmp_path: Path, mass: float) -> None:
+    """Where the scene names the method whose steps its stability limits."""
+    with pytest.raises(SolverError, match="energy balance does not close"):
+        bent(tmp_path, mass, 1.0, {"integrator": "dop853", "rtol": 1e-5})
 
 
 @pytest.mark.parametrize("force", [100.0, 1e5])

@@ -13,6 +13,8 @@ from flexclear.dynamics.model.mechanism import Site
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.run import joint_friction
 from flexclear.dynamics.run.controllers import REMEDY, require_controlled
+from flexclear.dynamics.run.progress_rate import DearError, affordable
+from flexclear.dynamics.run.refusals.refusal import STIFF_SHARE
 from flexclear.dynamics.run.trajectory import Trajectory
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.solver import Solver
@@ -106,9 +108,29 @@ def default_energy_error(solver: Solver) -> float:
     )
 
 
+def _tolerance(solver: Solver) -> float:
+    """Return the energy error above which a run is refused, as a fraction of the exchanged energy."""
+    return solver.ledger_tolerance or default_energy_error(solver)
+
+
+def _unresolved(solver: Solver, kinetic: float, elastic: float) -> float:
+    """Return the energy error that the tolerance leaves to a state that elastic parts hold at rest [J].
+
+    Such a state exchanges no energy. An error e of a state that stores E changes forces and deflections by sqrt(e/E).
+    kinetic, elastic: largest energies [J].
+    """
+    tolerance = _tolerance(solver)
+    # 1e-16: speeds that are a hundred-millionth of those with which E would be exchanged are rounding and the residue
+    # of the equilibrium; steps over many vibrations take one for a motion that lasts the whole step
+    if kinetic <= 1e-16 * elastic:
+        return tolerance * elastic
+    # fixed steps either diverge or leave no vibration, adaptive ones at the limit of stability one within the tolerance
+    return 0.0 if solver.step is not None else min(tolerance, PER_RTOL * solver.rtol) ** 2 * elastic
+
+
 @dataclass(frozen=True)
 class Balance:
-    """Energy error at the rows of a run, the energy exchanged, and the rounding of the largest energy [J].
+    """Energy error at the rows of a run, the energy exchanged, and what counts as rounding [J].
 
     of: the mechanism whose energies these are, in words; empty for all bodies.
     """
@@ -154,7 +176,8 @@ def balance(model: Model, seen: Observed, component: int | None = None) -> Balan
     # 1e-14: roundings of the work that the largest force does over the size of the mechanism: a force that holds it at
     # rest does work by the rounding of its positions
     # 1e-30: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
-    rounding = max(1e-12 * largest, 1e-14 * _largest_work(model, seen, component), 1e-30)
+    held = _unresolved(model.scene.solver, *(float(np.abs(totals[n]).max()) for n in ("kinetic", "elastic")))
+    rounding = max(1e-12 * largest, 1e-14 * _largest_work(model, seen, component), held, 1e-30)
     return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, rounding)
 
 
@@ -178,7 +201,8 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchang
     """Return the largest energy exchanged [J], by this run or before it.
 
     exchanged: energy before it, of a run that continues another one.
-    Raises SolverError when the run diverges, or its ledger is off by more than the scene's tolerance.
+    Raises SolverError when the run diverges, or its ledger is off by more than the scene's tolerance; DearError where
+    stability limited the steps and the scene names no integrator.
     """
     for refuse in model.parts.functions(REFUSALS):
         refuse(model, trajectory, seen)
@@ -191,12 +215,13 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchang
 
 def _require(model: Model, trajectory: Trajectory, result: Balance, exchanged: float) -> None:
     solver = model.scene.solver
-    tolerance = solver.ledger_tolerance or default_energy_error(solver)
+    tolerance = _tolerance(solver)
     allowed = tolerance * max(result.exchanged, exchanged) + result.rounding
     if result.error[result.worst] <= allowed:
         return
     first = int(np.argmax(~(result.error <= allowed)))
-    raise SolverError(
+    noisy = trajectory.counters["stiff_steps"] > STIFF_SHARE * trajectory.counters["steps"]
+    raise (DearError if noisy and affordable(model.scene) else SolverError)(
         f"at t = {trajectory.time[first]:.6g} s: the energy balance{result.of} does not close: the error is up to "
         f"{result.error[result.worst]:.3g} J of {result.exchanged:.3g} J exchanged (tolerance {tolerance:g}, "
         f"[solver.ledger_tolerance]); lost so far: {_losses(model, result.totals, first)}; "

@@ -25,7 +25,8 @@ UNVERIFIED = 1e-7
 
 
 class DearError(SolverError):
-    """A run by the default method is predicted to take more than AFFORDABLE evaluations."""
+    """The default method does not suit: it would take more than AFFORDABLE evaluations, or steps at the limit of its
+    stability and so leaves vibrations."""
 
 
 class Look(NamedTuple):
