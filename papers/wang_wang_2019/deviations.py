@@ -82,7 +82,7 @@ def _compare(run: xr.Dataset, i: np.ndarray, reference: xr.Dataset, j: np.ndarra
     )
 
 
-def _largest(values: np.ndarray) -> float:
+def _largest(values: np.typing.ArrayLike) -> float:
     return float(np.max(np.abs(values)))
 
 

@@ -108,7 +108,7 @@ def _at_equal_error(scene: fc.Scene, bundles: Mapping[str, Labelled]) -> tuple[f
 
 def equal_tolerance(scene: fc.Scene, bundles: Mapping[str, Labelled]) -> float:
     """Return the tolerance at which a scene has the common error over the first fraction of its run."""
-    velocity = next(q.name for q in scene.requested() if q.kind == "velocity")
+    velocity = next(q.name for q in scene.requested_quantities() if q.kind == "velocity")
     requested = {"time.end": _share(scene, FRACTION), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
     return float(simulate(_edited(scene, requested), bundles, silent).attrs["accuracy_rtol"])
 

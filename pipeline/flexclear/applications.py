@@ -58,7 +58,7 @@ def task_over(graphs: Iterable[Graph], run: str, variants: Callable[[Scene], Ite
     listed, compiled = list(graphs), dict[tuple[str, ...], Task]()
     for graph in listed:
         for variant in variants(graph.scene):
-            compiled.setdefault(kernels.shared(variant), kernels.task(variant, graph.bodies()))
+            compiled.setdefault(kernels.kernel_identity(variant), kernels.task(variant, graph.bodies()))
     return Task(
         run=run,
         params={graph.scene.name: simulation.params(graph.scene) for graph in listed},
