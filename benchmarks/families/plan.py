@@ -75,7 +75,7 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
             decided, planning = _planned(params, inputs)
     except FlexclearError as error:
         return {**drawing, "verdict": REFUSED, "reason": str(error)}
-    planned = plan.of(scene, dataset(decided, scene.title, {q.name: q.unit for q in scene.requested()}))
+    planned = plan.of(scene, dataset(decided, scene.title, {q.name: q.unit for q in scene.requested_quantities()}))
     full = edited(scene, {"accuracy": None})
     chosen = [parse(name, scene.owners()) for name in made.record["wanted"]]
     spent = [time.process_time()]
@@ -99,7 +99,7 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
         if all(verdict(one) != UNDECIDED for one in found) or not affordable(more):
             break
         found, members = compared(more), more
-    worst = max(found, key=lambda one: (one.missed, (one.error + one.chance) / one.allowed))
+    worst = max(found, key=lambda one: (one.is_missed, (one.error + one.chance) / one.allowed))
     outcome = verdict(worst)
     if outcome == MET and any(verdict(one) == MET_TO_HORIZON for one in found):
         outcome = MET_TO_HORIZON
@@ -132,7 +132,7 @@ def _requested(made: Drawn, full: Point, q: Quantity) -> float:
 def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float]:
     """Return a plan, and the processor time of planning [s]."""
     begun = time.process_time()
-    found = effect_plan.decided(params, inputs, silent)
+    found = effect_plan.decide_plan(params, inputs, silent)
     return found, time.process_time() - begun
 
 
@@ -146,7 +146,7 @@ def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
 def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any], members: int) -> tuple[Any, float]:
     """Return the watched quantities of a scene, and the processor time of one run [s]."""
     plain = watched_quantities.plain(scene)
-    rigid = {name: data for name, data in inputs.items() if name.removeprefix("rigid/") in plain.meshed()}
+    rigid = {name: data for name, data in inputs.items() if name.removeprefix("rigid/") in plain.meshed_bodies()}
     filled = simulation.rebuild(simulation.params(plain), rigid)
     bundles = {name: data for name, data in simulation.bundles(inputs).items() if name in filled.flexible()}
     end = filled.time.start + WARM * (filled.time.end - filled.time.start)

@@ -11,10 +11,9 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 import xarray as xr
+from scipy.spatial.transform import Rotation
 
-from flexclear.artifacts.quantities import SAME_TIME, common_times
-from flexclear.numerics.rotations import angle_about_y, rotation_between
-from papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, Model
+from papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, SAME_TIME, Model, common_times
 
 #: variables of two runs that are compared
 COMPARED = ("quaternion", "position", "velocity")
@@ -72,17 +71,18 @@ def ensemble_deviations(ensemble: xr.Dataset, reference: xr.Dataset, body: str) 
 
 def _compare(run: xr.Dataset, i: np.ndarray, reference: xr.Dataset, j: np.ndarray, body: str) -> Deviation:
     a, b = (one[list(COMPARED)].sel(body=body).isel(time=k) for one, k in ((run, i), (reference, j)))
-    qa, qb = a.quaternion.values, b.quaternion.values
+    # SciPy has the scalar part last
+    turn_a, turn_b = (Rotation.from_quat(np.roll(one.quaternion.values, -1, axis=1)) for one in (a, b))
     return Deviation(
-        angle=_largest(angle_about_y(qa) - angle_about_y(qb)),
-        rotation=_largest(rotation_between(qa, qb)),
+        angle=_largest(np.subtract(*(np.arcsin(turn.as_matrix()[:, 0, 2]) for turn in (turn_a, turn_b)))),
+        rotation=_largest((turn_a.inv() * turn_b).magnitude()),
         displacement=_largest(a.position.values[:, 2] - b.position.values[:, 2]),
         velocity=_largest(a.velocity.values[:, 2] - b.velocity.values[:, 2]),
         until=float(a.time.max()),
     )
 
 
-def _largest(values: np.ndarray) -> float:
+def _largest(values: np.typing.ArrayLike) -> float:
     return float(np.max(np.abs(values)))
 
 

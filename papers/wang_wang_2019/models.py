@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.quantities import common_times
-
 PLATFORM = "platform"
 JOINT = "A1"
 BALL_FRAME = "ball_A1.centre"
+#: times that differ by less than this fraction of the run's end are equal: outputs of two runs differ by rounding
+SAME_TIME = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +121,19 @@ def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
         horizon=comparable_until(post),
         impacts=_impacts(post),
     )
+
+
+def parameters(run: xr.Dataset) -> dict[str, Any]:
+    """Return the parameters of a run's scene, by the keys of its file."""
+    result: dict[str, Any] = json.loads(run.attrs["parameters"])
+    return result
+
+
+def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return indices into a and into b of the times that both contain, ascending, each time once."""
+    unit = SAME_TIME * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)) or 1.0
+    _, first, second = np.intersect1d(np.round(a / unit), np.round(b / unit), return_indices=True)
+    return first, second
 
 
 def comparable_until(post: xr.Dataset) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flexclear.scene.output import rows
+from papers import rows
 
 CITATION = "Wang & Wang (2019), Mechanism and Machine Theory 137, 83-107, doi:10.1016/j.mechmachtheory.2019.03.017"
 

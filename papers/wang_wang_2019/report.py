@@ -14,9 +14,19 @@ from typing import Any
 
 import xarray as xr
 
-from flexclear.post.pages import Part, downloads, figures_of, media, page, prose
-from flexclear.post.plotting.table import Table, as_csv, as_html, from_markdown
-from flexclear.system.progress import Progress
+from flexclear.applications import Progress
+from flexclear.publishing import (
+    Part,
+    Table,
+    as_csv,
+    as_html,
+    downloads,
+    figures_of,
+    from_markdown,
+    media,
+    page,
+    prose,
+)
 from papers import PROJECT
 from papers.wang_wang_2019 import DOCUMENTS, figures
 from papers.wang_wang_2019.published import CITATION, DISCREPANCIES

@@ -8,17 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import flexclear as fc
-from flexclear.artifacts.store import Record
-from flexclear.stages import derived_series, kernels, simulation
-from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check
-from flexclear.workflow.schedule import Outcome
-from flexclear.workflow.task import Task
+from flexclear.applications import PUBLISHING, Graph, Outcome, Record, Task, Workplace, check, origins, task_over
 from papers import PROJECT
 from papers.wang_wang_2019 import DOCUMENTS, figures, timing
 
 #: code that decides figures, tables and the page
-CODE = (*(f"flexclear.{name}" for name in ("dynamics", "structure", "post", "study")), __package__)
+CODE = (*PUBLISHING, __package__)
 #: files with parts that the page shows, below the folder of the sources: pages, their pictures, variants of scenes
 PAGES = [pattern for name in DOCUMENTS for pattern in (f"docs/{name}.md", f"docs/{name}/*.png")]
 PAGES += ["scenes/sps4/variants/*.toml"]
@@ -56,28 +51,10 @@ class Scenes:
         if not files:
             raise fc.InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
         graphs = [self.graph(f"{family}/{path.stem}") for path in files]
-        self.times[family] = Task(
-            stage="timing",
-            scene=family,
-            run="papers.wang_wang_2019.timing:run",
-            params={g.scene.name: simulation.params(g.scene) for g in graphs},
-            inputs={f"{g.scene.name}:{name}": task for g in graphs for name, task in g.bodies().items()}
-            | _paper_kernels(graphs),
-            code=("flexclear.stages.kernels", *simulation.CODE),
-            folder=f"runs/{family}",
-            names={"nc": "timing.nc"},
-        )
+        shown = {"folder": f"runs/{family}", "names": {"nc": "timing.nc"}}
+        run = f"{timing.__name__}:run"
+        self.times[family] = task_over(graphs, run, timing.variants, stage="timing", scene=family, **shown)
         return self.times[family]
-
-
-def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
-    """Return tasks for the kernels of the timing alone, compiled while other tasks run; the scenes' runs compile
-    theirs."""
-    tasks: dict[tuple[str, ...], Task] = {}
-    for graph in graphs:
-        for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
-            tasks.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
-    return {f"kernels/{k}": task for k, task in enumerate(tasks.values())}
 
 
 def bring(workplace: Workplace) -> Outcome:
@@ -138,7 +115,7 @@ def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list
         params={
             "results": str(workplace.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
-            "origins": {graph.scene.name: derived_series.origins(graph.scene) for graph in graphs},
+            "origins": {graph.scene.name: origins(graph.scene) for graph in graphs},
             "rendered": HEADLINE,
             "digests": sorted(record.digest for record in records.values()),
         },

@@ -5,19 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from flexclear import dynamics
-from flexclear.dynamics import analyses
-from flexclear.scene.load import edited
-from flexclear.stages.simulation import bundles, rebuild
-from flexclear.system.errors import SolverError
-from flexclear.system.progress import Progress, silent
+import flexclear as fc
+from flexclear.applications import Progress, cost, scenes_of, silent, simulate
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from flexclear.artifacts.labelled import Labelled
-    from flexclear.dynamics.record.cost import Cost
-    from flexclear.scene.schema import Scene
+    from flexclear.applications import Cost, Labelled
 
 #: equal error: relative error of the velocity of the body with most joints, over this first fraction of the run, in
 #: which all scenes can still be predicted point by point
@@ -34,25 +26,22 @@ TOLERANCE, DAMPED, STROKE = 4e-6, "radau", 0.06
 SETTINGS = ("equal", "step", "tolerance")
 
 
-def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Progress) -> dict[str, Any]:
     """Stage: return CPU time [s] of integration and recording of warm runs, evaluations, steps, largest energy error.
 
     Variables begin with the setting: ``equal_*`` at equal error, ``step_*`` at equal steps, ``tolerance_*`` by a damped
     method at the paper's tolerance as a fraction of the stroke, whatever the energy error, ``size_*`` the same as a
     fraction of the mechanism's size.
 
-    params: one entry of `params` per scene.  inputs: bundles as ``<scene>:bundle/<body>``; kernels, which must only
-    exist.  A scene that cannot be integrated at a setting has NaN there, and the reason in the attribute `refused`;
-    repeats that were not needed are NaN, too.
+    params, inputs: as `scenes_of` reads them; kernels must only exist.  A scene that cannot be integrated at a setting
+    has NaN there, and the reason in the attribute `refused`; repeats that were not needed are NaN, too.
     """
     import xarray as xr
 
     costs: dict[str, dict[str, Cost | None]] = {setting: {} for setting in (*SETTINGS, "size")}
     tolerance: dict[str, dict[str, float]] = {"equal": {}, "tolerance": {}, "size": {}}
     refused = []
-    for i, name in enumerate(params):
-        mine = {key.removeprefix(f"{name}:"): data for key, data in inputs.items() if key.startswith(f"{name}:")}
-        scene, reduced = rebuild(params[name], mine), bundles(mine)
+    for i, (name, scene, reduced) in enumerate(scenes_of(params, inputs)):
         progress(i / len(params), f"timing {name}")
         tolerance["equal"][name], equal = _at_equal_error(scene, reduced)
         costs["equal"][name] = equal
@@ -78,16 +67,16 @@ def _variables(setting: str, costs: list[Cost | None]) -> dict[str, Any]:
     import numpy as np
 
     def of_scenes(name: str) -> list[float]:
-        return [float(cost.run.attrs[name]) if cost else float("nan") for cost in costs]
+        return [float(one.run.attrs[name]) if one else float("nan") for one in costs]
 
-    error = [float(np.abs(cost.run["energy_error"]).max()) if cost else float("nan") for cost in costs]
+    error = [float(np.abs(one.run["energy_error"]).max()) if one else float("nan") for one in costs]
     variables: dict[str, Any] = {
         f"{setting}_evaluations": (("scene",), of_scenes("evaluations"), {"units": "1"}),
         f"{setting}_steps": (("scene",), of_scenes("steps"), {"units": "1"}),
         f"{setting}_energy_error": (("scene",), error, {"units": "J"}),
     }
     for part, dim in (("integration", "repeat"), ("recording", "recorded")):
-        repeats = [getattr(cost, part) if cost else () for cost in costs]
+        repeats = [getattr(one, part) if one else () for one in costs]
         seconds = np.full((len(costs), max(1, *map(len, repeats))), np.nan)
         for row, values in zip(seconds, repeats, strict=True):
             row[: len(values)] = values
@@ -95,54 +84,59 @@ def _variables(setting: str, costs: list[Cost | None]) -> dict[str, Any]:
     return variables
 
 
-def _measured(scene: Scene, bundles: Mapping[str, Labelled], *, checked: bool) -> tuple[Cost | None, str]:
+def _measured(scene: fc.Scene, bundles: Mapping[str, Labelled], *, checked: bool) -> tuple[Cost | None, str]:
     """Return the cost of a run, or None and the reason."""
     try:
         # an unmeasured start loads the compiled code; reports would be part of the measured time
-        dynamics.simulate(_edited(scene, {"time.end": _share(scene, WARM)}), bundles, silent)
-        return analyses.cost(scene, bundles, silent, checked=checked), ""
-    except SolverError as error:
+        simulate(_edited(scene, {"time.end": _share(scene, WARM)}), bundles, silent)
+        return cost(scene, bundles, silent, checked=checked), ""
+    except fc.SolverError as error:
         return None, str(error).partition(";")[0]  # the other warnings of such a run are of no use here
 
 
-def _at_equal_error(scene: Scene, bundles: Mapping[str, Labelled]) -> tuple[float, Cost]:
+def _at_equal_error(scene: fc.Scene, bundles: Mapping[str, Labelled]) -> tuple[float, Cost]:
     """Return tolerance and cost at equal error; decade by decade tighter where the whole run is refused."""
     rtol = equal_tolerance(scene, bundles)
     while True:
-        cost, why = _measured(_edited(scene, {"solver.rtol": rtol}), bundles, checked=True)
-        if cost is not None:
-            return rtol, cost
+        measured, why = _measured(_edited(scene, {"solver.rtol": rtol}), bundles, checked=True)
+        if measured is not None:
+            return rtol, measured
         if rtol < scene.solver.rtol:
-            raise SolverError(why)
+            raise fc.SolverError(why)
         rtol *= 0.1
 
 
-def equal_tolerance(scene: Scene, bundles: Mapping[str, Labelled]) -> float:
+def equal_tolerance(scene: fc.Scene, bundles: Mapping[str, Labelled]) -> float:
     """Return the tolerance at which a scene has the common error over the first fraction of its run."""
-    velocity = next(q.name for q in scene.requested() if q.kind == "velocity")
+    velocity = next(q.name for q in scene.requested_quantities() if q.kind == "velocity")
     requested = {"time.end": _share(scene, FRACTION), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
-    return float(dynamics.simulate(_edited(scene, requested), bundles, silent).attrs["accuracy_rtol"])
+    return float(simulate(_edited(scene, requested), bundles, silent).attrs["accuracy_rtol"])
 
 
-def _share(scene: Scene, fraction: float) -> float:
+def _share(scene: fc.Scene, fraction: float) -> float:
     """Return the end of the first fraction of a run [s]."""
     return scene.time.start + fraction * (scene.time.end - scene.time.start)
 
 
-def _edited(scene: Scene, edit: Mapping[str, Any]) -> Scene:
-    return edited(scene, {"accuracy": None, "ensemble": None, **edit})
+def _edited(scene: fc.Scene, edit: Mapping[str, Any]) -> fc.Scene:
+    return fc.edited(scene, {"accuracy": None, "ensemble": None, **edit})
 
 
-def paper_solver(scene: Scene) -> dict[str, Any]:
+def paper_solver(scene: fc.Scene) -> dict[str, Any]:
     """Return the paper's method as the table of a scene's solver; contacts are noticed at the ends of steps."""
     return {**PAPER, **({"events": "at step ends"} if scene.contacts() else {})}
 
 
-def paper_scene(scene: Scene) -> Scene:
+def paper_scene(scene: fc.Scene) -> fc.Scene:
     """Return a scene with the paper's method."""
     return _edited(scene, {"solver": paper_solver(scene)})
 
 
-def damped_scene(scene: Scene, rtol: float) -> Scene:
+def variants(scene: fc.Scene) -> tuple[fc.Scene, ...]:
+    """Return the scenes that the timing alone runs, by their kernels; the runs compile those at equal error."""
+    return paper_scene(scene), damped_scene(scene, scene.solver.rtol)
+
+
+def damped_scene(scene: fc.Scene, rtol: float) -> fc.Scene:
     """Return a scene with the damped method at a tolerance."""
     return _edited(scene, {"solver": {"integrator": DAMPED, "rtol": rtol}})

@@ -10,7 +10,7 @@ import xarray as xr
 
 from flexclear import dynamics, load_scene
 from flexclear.artifacts import quantities
-from flexclear.artifacts.effect_size import recorded as recorded_quantities
+from flexclear.artifacts.effect_size import compared_values as recorded_quantities
 from flexclear.artifacts.labelled import LabelledArrays, of
 from flexclear.dynamics import analyses
 from flexclear.dynamics.effects import schemes

@@ -208,11 +208,11 @@ LISTINGS = {
 @pytest.mark.parametrize("name", LISTINGS)
 def test_listings_of_abaqus_and_nastran_state_cycles(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(LISTINGS[name])
-    found, mass = programs.listed(tmp_path / name, "recipe")
+    found, mass = programs.read_listing(tmp_path / name, "recipe")
     assert (found.tolist(), mass) == ([100.0, 200.0], None)
     (tmp_path / name).write_text(LISTINGS[name][:60])
     with pytest.raises(InputError, match="no table of finite frequencies"):
-        programs.listed(tmp_path / name, "recipe")
+        programs.read_listing(tmp_path / name, "recipe")
 
 
 # Files of all programs hold the same block ----------------------------------------------------------------------------

@@ -284,7 +284,7 @@ def test_frames_of_recipes_have_quantities_without_a_joint() -> None:
     scene = load_scene(TREE / "scenes/checks/flexible_slider_crank.toml", {"time.end": "1 ms"})
     asked = edited(scene, {"accuracy": {"rod.middle.frame_position.x": {"relative": 1e-3}}})
     watched = edited(asked, {"view": {"watch": ["rod.middle.frame_position"]}})
-    assert [one.name for one in watched.watched()] == ["rod.middle.frame_position"]
+    assert [one.name for one in watched.watched_quantities()] == ["rod.middle.frame_position"]
     start = evaluate(simulate(edited(watched, {"accuracy": None}), bundles(scene), silent), "rod.middle.frame_position")
     assert start.values[0] == pytest.approx([0.3, 0.0, 0.0], abs=1e-12)
     with pytest.raises(InputError, match=r"did you mean 'rod.middle.frame_position'"):

@@ -21,7 +21,7 @@ EXACT, DIFFERENCE = 1e-12, 1e-9
 
 
 def matrices(given: Scene, **pose: Any) -> xr.Dataset:
-    return analyses.state_space(given, bundles(given), silent, given.watched(), **pose)
+    return analyses.state_space(given, bundles(given), silent, given.watched_quantities(), **pose)
 
 
 def check(name: str, changes: dict[str, Any] | None = None) -> Scene:

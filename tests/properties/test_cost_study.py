@@ -11,7 +11,7 @@ import xarray as xr
 from flexclear.artifacts import quantities
 from flexclear.artifacts.quantities import standard_error
 from flexclear.post.cost import answer, causes, statistics, work_precision
-from flexclear.post.cost.study import Point, assemble, resolved
+from flexclear.post.cost.study import Point, assemble, is_resolved
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import SolverError
 
@@ -88,7 +88,7 @@ def test_refused_points_are_gaps_with_their_reason(found: xr.Dataset):
 
 def test_errors_near_that_of_the_reference_are_not_resolved():
     found, *_ = study(uncertainty=1e-7)
-    reported = resolved(found, "tolerance").sel(adaptive_integrator="dop853", quantity="slider.position")
+    reported = is_resolved(found, "tolerance").sel(adaptive_integrator="dop853", quantity="slider.position")
     assert reported.sel(rtol=1e-6).item()
     assert not reported.sel(rtol=1e-9).item()
 

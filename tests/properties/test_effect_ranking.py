@@ -8,13 +8,13 @@ from flexclear.post.answers.effect_ranking import (
     IDEAL,
     Pair,
     assemble,
-    compared,
-    decided,
     ideal_sentences,
-    needed,
+    influence_of,
+    is_decided,
+    members_to_decide,
     sentence,
     table,
-    undecided,
+    undecided_quantities,
 )
 from flexclear.post.answers.effect_sizes import chart, stay
 from flexclear.scene.quantity import Quantity
@@ -49,29 +49,29 @@ def study(**pairs: Pair):
 
 
 def test_without_scatter_a_change_is_the_distance_of_the_two_runs():
-    change = compared(Pair(point(0.0), point(0.03), 0), VELOCITY)
+    change = influence_of(Pair(point(0.0), point(0.03), 0), VELOCITY)
     assert change.difference == pytest.approx(0.03)
     assert change.uncertainty == 0.0
 
 
 def test_scatter_leaves_a_change_undecided_and_more_members_decide_it():
     few, many = (Pair(point(0.0, 0.05), point(0.03, 0.05), members) for members in (4, 1024))
-    assert undecided(few, [VELOCITY]) == [VELOCITY]
-    assert undecided(many, [VELOCITY]) == []
-    change = compared(few, VELOCITY)
+    assert undecided_quantities(few, [VELOCITY]) == [VELOCITY]
+    assert undecided_quantities(many, [VELOCITY]) == []
+    change = influence_of(few, VELOCITY)
     # chance falls with the square root of the members, and Student's t with it
-    assert 4 < needed(change, 1.0, 4) < 1000
+    assert 4 < members_to_decide(change, 1.0, 4) < 1000
 
 
 def test_no_change_is_decided_when_chance_is_below_a_hundredth():
-    change = compared(Pair(point(0.0, 1e-3), point(0.0, 1.01e-3), 8), VELOCITY)
+    change = influence_of(Pair(point(0.0, 1e-3), point(0.0, 1.01e-3), 8), VELOCITY)
     assert change.difference == 0.0
-    assert decided(change, 1.0)
-    assert not decided(change, 0.01)
+    assert is_decided(change, 1.0)
+    assert not is_decided(change, 0.01)
 
 
 def test_the_same_members_do_not_differ():
-    change = compared(Pair(point(0.0, 1e-3), point(0.0, 1e-3), 8), VELOCITY)
+    change = influence_of(Pair(point(0.0, 1e-3), point(0.0, 1e-3), 8), VELOCITY)
     assert change.difference == change.uncertainty == 0.0
 
 

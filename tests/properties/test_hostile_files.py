@@ -19,7 +19,7 @@ import pytest
 from pydantic import ValidationError
 
 from flexclear.artifacts import maintenance
-from flexclear.artifacts.disk import checked, read_checked, sha256
+from flexclear.artifacts.disk import encode_with_digest, read_checked, sha256
 from flexclear.artifacts.store import Store, read_record
 from flexclear.post.render import forms
 from flexclear.scene.load import load_scene
@@ -121,12 +121,12 @@ def test_a_long_row_of_scenes_that_extend_each_other_is_refused(tmp_path: Path) 
 def test_values_of_the_command_line_are_refused_as_those_of_files(value: str, tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(BASE)
     with refused(r"too deeply|is not a number|\[body.crank.mass\]"):
-        scenes.loaded(str(tmp_path / "s.toml"), [f"body.crank.mass={value}"])
+        scenes.load_by_name(str(tmp_path / "s.toml"), [f"body.crank.mass={value}"])
 
 
 def test_many_changes_give_a_name_that_a_folder_can_have(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(BASE)
-    names = {scenes.loaded(str(tmp_path / "s.toml"), [f"title={'a' * 300}{k}"]).name for k in range(2)}
+    names = {scenes.load_by_name(str(tmp_path / "s.toml"), [f"title={'a' * 300}{k}"]).name for k in range(2)}
     assert len(names) == 2
     assert max(map(len, names)) < 255  # bytes of a name on all usual file systems
 
@@ -268,7 +268,7 @@ def stored(root: Path) -> tuple[Store, Path]:
 
 def altered(path: Path, **changes: Any) -> None:
     """With a sum that is right: a digest is no signature."""
-    path.write_bytes(checked({**(read_checked(path) or {}), **changes}))
+    path.write_bytes(encode_with_digest({**(read_checked(path) or {}), **changes}))
 
 
 def test_what_is_pruned_lies_in_the_cache(tmp_path: Path) -> None:

@@ -46,7 +46,9 @@ def test_a_stress_that_no_rigid_body_has_is_planned_by_its_size_in_the_flexible_
     scene = edited(scene, stress)
     stressed = Point({"rod.von_mises.series": np.full((3, 1), 5e6), "rod.von_mises.largest": np.array(5e6)}, {}, {}, 1)
     without, unused = (lambda: Point({}, {}, {}, 1)), lambda: pytest.fail("the full scene need not be run")
-    asked = search._requested(scene, scene.requested(), (without, without, lambda: stressed, unused), watched=True)
+    asked = search._requested(
+        scene, scene.requested_quantities(), (without, without, lambda: stressed, unused), watched=True
+    )
     assert asked == {"rod.von_mises": pytest.approx(5e4)}
 
 
@@ -70,7 +72,7 @@ def test_beyond_the_horizon_as_much_is_allowed_as_two_runs_of_the_scene_differ()
     assert (same.error, same.chance, same.horizon) == (0.0, 0.0, 1.0)  # the same members: nothing is chance
     early = _scattered(np.where(later, 0.0, 3.0), np.where(later, spread, 0.0))
     missed = agreement(early, full, q, 4, requested)
-    assert missed.missed
+    assert missed.is_missed
     assert missed.error == pytest.approx(3.0)
     assert missed.allowed == requested
     late = _scattered(np.where(later, 60.0, 0.0), np.where(later, spread, 0.0))

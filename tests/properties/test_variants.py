@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.artifacts.effect_size import chance, influence, recorded
+from flexclear.artifacts.effect_size import chance, compared_values, influence
 from flexclear.artifacts.points import Point
 from flexclear.commands.new import write
-from flexclear.post.answers.effect_sizes import closed
 from flexclear.post.answers.effect_sizes import variants as needed
+from flexclear.post.answers.effect_sizes import with_dependents
 from flexclear.scene import variants
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import KINDS, WORDS, Quantity
@@ -169,7 +169,7 @@ def test_the_variants_of_two_effects_are_the_square(crank: Path):
     every = [e for e in variants.effects(load_scene(crank)) if e.name in ("body.rod.modes", "load.gravity")]
     assert len(needed(every)) == 4
     three = list(variants.effects(load_scene(crank)))
-    assert all(closed(three, gone) == gone for gone in needed(three))
+    assert all(with_dependents(three, gone) == gone for gone in needed(three))
 
 
 def _point(values: np.ndarray, spread: float = 0.0) -> Point:
@@ -219,7 +219,7 @@ def test_changes_of_a_component_that_are_rounding_of_its_vector_are_none():
 
     assert influence(moving(2e-14), moving(1e-15), across, 0).most == 0.0
     assert influence(moving(1e-9), moving(0.0), across, 0).difference == pytest.approx(1e-9)
-    assert {one.name for one in recorded({"body": ["a"]}, [across])} == set(moving(0.0).values)
+    assert {one.name for one in compared_values({"body": ["a"]}, [across])} == set(moving(0.0).values)
 
 
 def test_members_that_have_parted_and_agree_at_one_output_by_accident_tell_no_difference():

@@ -1,7 +1,7 @@
 """The workflow at work with small engines in place of the real ones: in a copy of the project, or in this process.
 
-Their `simulated` and `derived` make little datasets, and log each call to a file. `simulated` does not end while there
-is a file of the name HELD_BY.
+Their `simulated` and `derive_arrays` make little datasets, and log each call to a file. `simulated` does not end
+while there is a file of the name HELD_BY.
 """
 
 import os
@@ -62,7 +62,7 @@ def ensemble(scene, bundles, progress):
 """
 
 POST = """
-def derived(run, ensemble):
+def derive_arrays(run, ensemble):
     log(f"post {run.attrs['scene']}")
     return run.to_xarray().mean("time")
 """
@@ -222,7 +222,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     """The same two scenes and engines in this process, for what is no matter of processes or of sources."""
     engines: dict[str, Any] = {}
     exec(ENGINE + POST, engines)
-    for module, name in ((dynamics, "simulated"), (analyses, "ensemble"), (series, "derived")):
+    for module, name in ((dynamics, "simulated"), (analyses, "ensemble"), (series, "derive_arrays")):
         monkeypatch.setattr(module, name, engines[name])
     monkeypatch.setattr(scenes, "DATA", tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.artifacts.points import Point, joined
+from flexclear.artifacts.points import Point, join_points
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.record import point as points_of
 from flexclear.dynamics.record.point import Runner
@@ -183,7 +183,7 @@ def test_members_in_batches_are_those_of_one_point(root: Path):
     scene = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.3})
     whole = runner(scene, members=6).run(scene)
     parts = [runner(scene, members=4).run(scene), runner(scene, members=2, first=4).run(scene)]
-    found = joined([(parts[0], 4), (parts[1], 2)])
+    found = join_points([(parts[0], 4), (parts[1], 2)])
     assert found.evaluations == whole.evaluations
     for mine, its in ((found.values, whole.values), (found.deviation, whole.deviation)):
         assert mine.keys() == its.keys()

@@ -114,7 +114,7 @@ def test_a_run_that_ends_otherwise_is_reported(scene: Path, tmp_path: Path, comm
         content = {name: archive.read(name) for name in archive.namelist()}
     facts = json.loads(content["facts.json"])
     facts |= {"exit_code": 0, "libraries": {"numpy": "1.0"}}
-    path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
+    path.write_bytes(reproduction._zip_files({**content, "facts.json": json.dumps(facts).encode()}))
     reported = command("doctor", "--repeat", path, code=4)
     assert "with 0 there" in reported.out
     assert "here, 1.0 there" in reported.out
@@ -124,7 +124,7 @@ def test_a_run_that_ends_otherwise_is_reported(scene: Path, tmp_path: Path, comm
 def test_a_file_that_leads_out_of_its_folder_is_refused(name: str, tmp_path: Path) -> None:
     facts = {"scene": "a.toml", "settings": [], "exit_code": 0, "libraries": {}, "python": ""}
     content = {"facts.json": json.dumps(facts).encode(), "log.txt": b"", name: b"x"}
-    (tmp_path / "a.zip").write_bytes(reproduction._packed(content))
+    (tmp_path / "a.zip").write_bytes(reproduction._zip_files(content))
     with pytest.raises(InputError, match="lead out of it"):
         reproduction.repeat(tmp_path / "a.zip", [])
 
@@ -146,5 +146,5 @@ def test_a_run_that_is_repeated_is_compared_to_the_last_bit(root: Path, tmp_path
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     facts = json.loads(content["facts.json"]) | {"settings": ["time.end='30 ms'"]}
-    path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
+    path.write_bytes(reproduction._zip_files({**content, "facts.json": json.dumps(facts).encode()}))
     assert "the run is not the same to the last bit" in command("doctor", "--repeat", path).out

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import flexclear as fc
-from flexclear.artifacts.disk import checked
+from flexclear.artifacts.disk import encode_with_digest
 from flexclear.artifacts.store import Record, Store
 from flexclear.commands import cache, why
 from flexclear.commands.__main__ import main
@@ -49,7 +49,7 @@ def test_what_is_no_record_is_not_taken_for_a_damaged_one(store: Store, command:
     """Memos of commands, and files of artifacts that end alike."""
     made = store.put("figures", "a" * 32, {"index.json": b"{}"}, {})
     memo = store.root / "cache" / "code.json"
-    memo.write_bytes(checked({}))
+    memo.write_bytes(encode_with_digest({}))
     assert "1 artifacts, 0 faults, 0 files" in command("cache", "check").out
     command("cache", "prune")
     assert store.fault(made) is None
@@ -104,7 +104,9 @@ def test_kernels_of_another_build_are_counted_and_are_no_damage(store: Store, co
     folder.mkdir(parents=True)
     for name, ends in (("old", (".py", ".nbi")), ("bad", (".py", ".code"))):
         (folder / f"flexclear_{name}.py").write_text("")
-        (folder / f"flexclear_{name}.sum").write_bytes(checked({f"flexclear_{name}{end}": "1" for end in ends}))
+        (folder / f"flexclear_{name}.sum").write_bytes(
+            encode_with_digest({f"flexclear_{name}{end}": "1" for end in ends})
+        )
     reported = command("cache", "check", code=4).out
     assert "2 compiled kernels, 1 unused of another build" in reported
     assert "flexclear_bad.py is damaged" in reported
@@ -118,7 +120,7 @@ def test_kernels_that_another_process_removes_meanwhile_are_no_damage(
     folder.mkdir(parents=True)
     source, sums = folder / "flexclear_old.py", folder / "flexclear_old.sum"
     source.write_text("")
-    sums.write_bytes(checked({}))
+    sums.write_bytes(encode_with_digest({}))
     compiled = files.compiled
 
     def pruned(path: Path) -> bool:

@@ -7,7 +7,7 @@ import pytest
 
 from flexclear.commands.new import write
 from flexclear.scene.load import edited, load_scene
-from flexclear.stages.scenes import unrecorded
+from flexclear.stages.scenes import missing_stress_errors
 from tests.stages.conftest import Command
 from tests.stages.typical_mistakes import LOAD
 
@@ -251,6 +251,6 @@ def test_a_watched_stress_that_a_body_does_not_have_is_refused(tmp_path: Path, r
     path = write("slider-crank", tmp_path)[0]
     scene = edited(load_scene(path), {"output.stress": ["rod"], "view": {"watch": [asked]}})
     (tmp_path / "rod.toml").write_text(recipe)
-    said = [str(error) for error in unrecorded(scene)]
+    said = [str(error) for error in missing_stress_errors(scene)]
     assert len(said) == bool(lacks)
     assert all(f"[view.watch]: '{asked}' is not recorded: 'rod' is" in one and lacks in one for one in said)

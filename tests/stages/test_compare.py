@@ -56,7 +56,7 @@ def test_no_modes_make_a_rigid_body_and_so_does_the_recipe_alone(crank: Path):
     pose = {"position": [0.05, 0, 0]}
     table = {"rod": {"type": "rigid", "mesh": "rod.toml", "pose": pose}}
     data = bundle.rigid(kind.build(read_recipe(crank.parent / "rod.toml")))
-    filled = simulation.filled(table, {"rigid/rod": data})["rod"]
+    filled = simulation.fill_in_recipes(table, {"rigid/rod": data})["rod"]
     assert filled["mass"] == float(data["mass"])
     assert set(filled["frames"]) == {"big_end", "middle", "small_end"}
     assert filled["pose"] == pose
@@ -75,7 +75,7 @@ def test_a_twin_differs_in_the_effect_alone(crank: Path):
     both = ideal(scene)
     assert not both.contacts()
     assert not both.flexible()
-    assert {q.name for q in both.watched()} == {"slider.position", "slider.velocity", "motor.drive_force"}
+    assert {q.name for q in both.watched_quantities()} == {"slider.position", "slider.velocity", "motor.drive_force"}
     assert (both.time, both.drive, both.load) == (scene.time, scene.drive, scene.load)
 
 

@@ -263,7 +263,7 @@ def test_the_first_answer_comes_soon_and_its_errors_are_those_of_a_converged_run
     other = {"integrator": "dop853" if own != "dop853" else "dopri5", "rtol": max(TIGHTER * rtol, TIGHTEST)}
     mine, reference = (_run(scene, workplace, solver) for solver in ({"integrator": own, "rtol": rtol}, other))
     until = study.attrs["horizon"] if study.attrs["horizon"] != "none" else np.inf
-    chosen = scene.requested() if scene.accuracy is not None else scene.watched()
+    chosen = scene.requested_quantities() if scene.accuracy is not None else scene.watched_quantities()
     for q in chosen:
         if not q.over_time:
             continue

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.artifacts.disk import checked, publish
+from flexclear.artifacts.disk import encode_with_digest, publish
 from flexclear.artifacts.paths import kernel_root, results_root
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import files, folder, machine_code
@@ -83,7 +83,7 @@ def test_every_flipped_bit_and_every_cut_is_detected_before_anything_is_loaded(k
 def test_what_cannot_be_loaded_is_compiled_again(kernel: Path, content: bytes) -> None:
     """Its digest is right: it was written so, by whatever mistake; or it was interrupted; or its source is another."""
     kernel.with_suffix(files.CODE).write_bytes(content)
-    publish(kernel.with_suffix(".sum"), checked(files._digests(kernel)))
+    publish(kernel.with_suffix(".sum"), encode_with_digest(files._digests(kernel)))
     assert compiled(kernel)
     assert used(kernel)
     assert not used(kernel)

@@ -86,7 +86,7 @@ def test_sources_are_parsed_while_other_threads_parse(monkeypatch: pytest.Monkey
         return parse(source)
 
     monkeypatch.setattr(ast, "parse", disturbed)
-    assert fingerprint._examined(b"import numpy as np", True)[1] == ["numpy"]
+    assert fingerprint._digest_and_libraries(b"import numpy as np", True)[1] == ["numpy"]
     assert len(calls) == 3
 
 
@@ -297,7 +297,7 @@ def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytes
     names, memo = ["flexclear.stages.simulation", "flexclear.system"], tmp_path / "code.json"
     known = sources_of(TREE).code(names)
     with monkeypatch.context() as patch:
-        patch.setattr(fingerprint, "_examined", lambda *_: pytest.fail("a file is read again"))
+        patch.setattr(fingerprint, "_digest_and_libraries", lambda *_: pytest.fail("a file is read again"))
         assert sources_of(TREE, memo).code(names) == known
     assert "flexclear/stages/simulation.py" in (read_checked(memo) or {})
 

@@ -147,7 +147,7 @@ def test_only_lines_of_toml_files_are_quoted(tmp_path: Path):
     (named := tmp_path / "named.toml").symlink_to(secret)
     (own := tmp_path / "own.toml").write_text(secret.read_text())
     record = {"line": 2, "place": "x.toml [body.rod.mass]"}
-    quoted = live_page._quoted([{**record, "file": str(file)} for file in (secret, named, own)])
+    quoted = live_page._with_lines([{**record, "file": str(file)} for file in (secret, named, own)])
     assert [one["text"] for one in quoted] == ["", "", "mass = 'a password'"]
 
 

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from flexclear.artifacts import netcdf
-from flexclear.artifacts.labelled import labelled, of
+from flexclear.artifacts.labelled import label_arrays, of
 
 
 def everything() -> xr.Dataset:
@@ -103,4 +103,4 @@ def test_files_are_written_while_another_thread_imports_xarray(tmp_path: Path, m
 
 def test_arrays_of_one_dimension_are_of_one_length() -> None:
     with pytest.raises(ValueError, match="x has the shape"):
-        labelled({"x": (("t",), np.zeros(2)), "y": (("t",), np.zeros(3))}, {})
+        label_arrays({"x": (("t",), np.zeros(2)), "y": (("t",), np.zeros(3))}, {})

@@ -13,7 +13,7 @@ import xarray as xr
 
 from flexclear.artifacts.paths import results_root
 from flexclear.commands import check, show
-from flexclear.commands.check import examined
+from flexclear.commands.check import examine
 from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.scene import lines
 from flexclear.scene.json_schema import scene_schema
@@ -63,7 +63,7 @@ def made() -> dict[object, list[check.Body]]:
 
 @pytest.fixture
 def meshed_once(made: dict[object, list[check.Body]], monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh = check._meshed
+    mesh = check._mesh_recipe
 
     def known(path: Path, segment: tuple[int, int] | None, seen: check.Findings) -> list[check.Body]:
         text = path.read_text()
@@ -74,7 +74,7 @@ def meshed_once(made: dict[object, list[check.Body]], monkeypatch: pytest.Monkey
             made[text, segment] = found
         return made[text, segment]
 
-    monkeypatch.setattr(check, "_meshed", known)
+    monkeypatch.setattr(check, "_mesh_recipe", known)
 
 
 @pytest.mark.usefixtures("meshed_once")
@@ -108,7 +108,7 @@ def validators():
 @pytest.mark.parametrize("path", [*SCENES, *RECIPES, *sorted(TEMPLATES.rglob("*.toml"))], ids=lambda path: path.stem)
 def test_nothing_that_the_project_ships_is_doubted(path: Path, validators):
     """No scene, recipe or template has an error or a plausibility warning, and the schema accepts each of them."""
-    seen = examined(str(path))
+    seen = examine(str(path))
     assert [str(error) for error in seen.errors] == []
     assert [str(warning) for warning in seen.warnings] == []
     table = tomllib.loads(path.read_text())

@@ -20,7 +20,7 @@ from flexclear.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper
 from flexclear.scene import variants
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import uncoupled
+from flexclear.scene.variants import uncoupled_paths
 from flexclear.stages import effect_plan
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
@@ -226,7 +226,7 @@ def test_watched_components_that_never_change_are_left_out_of_the_levels(tmp_pat
     assert said.count("Left out: rod.velocity.z, which never changes") == 1
     planned, found = fc.plan(load_scene(path), budget=30.0, accuracy="1 %")
     assert list(found["quantity"].values) == ["rod.velocity", "hinge.force"]
-    assert planned.watched()[0].name == "rod.velocity.z"
+    assert planned.watched_quantities()[0].name == "rod.velocity.z"
     path.write_text(f'{text}\n[accuracy]\nrod.velocity = "1 %"\n"rod.velocity.z" = "1 %"\n')
     assert "[accuracy] rod.velocity.z" in command("plan", path, "-q", "--jobs", "1", code=2).err
 
@@ -275,8 +275,8 @@ def test_what_nothing_couples_to_what_is_asked_for_is_not_integrated(tmp_path: P
             "accuracy": {"quantities": {"platform.position": {"absolute": 1e-6}}},
         },
     )
-    assert uncoupled(scene, {"platform"}) == ("body.bob", "joint.hinge")
-    assert set(uncoupled(scene, {"bob"})).isdisjoint({"body.bob", "joint.hinge", "load.gravity"})
+    assert uncoupled_paths(scene, {"platform"}) == ("body.bob", "joint.hinge")
+    assert set(uncoupled_paths(scene, {"bob"})).isdisjoint({"body.bob", "joint.hinge", "load.gravity"})
     planned, found = fc.plan(scene)
     assert "bob" not in planned.body
     assert "hinge" not in planned.joint

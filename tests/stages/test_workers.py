@@ -45,12 +45,12 @@ def fail() -> None:
 
 def stop() -> None:
     with stopping.until(-1.0, "time is over"), workers.team(1):
-        assert stopping.requested()
+        assert stopping.stop_reason()
 
 
 def test_a_command_starts_its_workers_once() -> None:
     """Also where a later part of it wants as many as there are cores."""
-    with workers.reused():
+    with workers.keep_workers():
         first = one()
         assert one(cores.cores()) == first
         assert alive(first)
@@ -63,7 +63,7 @@ def test_outside_of_a_command_they_end_with_the_call() -> None:
 
 @pytest.mark.parametrize("end", [fail, stop])
 def test_workers_of_failed_or_stopped_work_are_not_reused(end: Callable[[], None]) -> None:
-    with workers.reused():
+    with workers.keep_workers():
         first = one()
         end()
         wait_until(lambda: not running(first))
@@ -125,7 +125,7 @@ def test_a_script_without_a_guard_is_told_to_have_one(root: Path, tmp_path: Path
 
 def test_a_worker_that_is_killed_between_two_calls_is_one_sentence() -> None:
     """As by the system where memory is full; before, a traceback or an end without a word."""
-    with workers.reused():
+    with workers.keep_workers():
         worker = one()
         os.kill(worker, signal.SIGKILL)
         wait_until(lambda: not running(worker))
@@ -165,9 +165,9 @@ def chatty(count: int) -> int:
 def stopped_reason(_: int) -> str:
     """Why a worker is to stop, once it is."""
     end = time.monotonic() + 60.0
-    while not stopping.requested() and time.monotonic() < end:
+    while not stopping.stop_reason() and time.monotonic() < end:
         time.sleep(0.01)
-    return stopping.requested()
+    return stopping.stop_reason()
 
 
 def test_a_stop_reaches_workers_to_which_sigterm_was_sent_and_does_not_wait_for_killed_ones() -> None:
@@ -198,6 +198,6 @@ def test_many_reports_arrive_in_their_order() -> None:
     with workers.team(1) as team:
         future, news = team.pool.submit(chatty, 3000), []
         while not future.done() or not team.channel.reports.empty():
-            news += team.channel.received()
+            news += team.channel.take_reports()
         assert future.result() == len(news) == 3000
     assert [fraction for _, fraction, _ in news] == [k / 3000 for k in range(3000)]

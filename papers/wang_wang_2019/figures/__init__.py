@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure as Drawing
 
-    from flexclear.post.plotting.table import Table
-    from flexclear.system.progress import Progress
+    from flexclear.applications import Progress
+    from flexclear.publishing import Table
 
 NAMES = {
     "fig01": "structure:mechanism",
@@ -80,12 +80,10 @@ def figure(name: str) -> Figure:
 
 def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Stage: draw ``<name>.png`` and ``.svg`` of a figure, or ``.csv`` and ``.md`` of a table; inputs by reference."""
-    from flexclear.post.plotting import style, table
+    from flexclear.publishing import files, style
 
-    name = params["figure"]
     with style.style():
-        made = figure(name).make(dict(inputs))
-        return dict(table.files(name, made) if isinstance(made, table.Table) else style.files(name, made))
+        return dict(files(params["figure"], figure(params["figure"]).make(dict(inputs))))
 
 
 def index(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

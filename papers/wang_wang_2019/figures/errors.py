@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from flexclear.post.plotting.table import Table
-from flexclear.post.single_run.series import parameters
+from flexclear.publishing import Table
 from papers.wang_wang_2019 import models as paper
 from papers.wang_wang_2019.deviations import (
     Deviation,
@@ -221,7 +220,7 @@ def _between_outputs(data: Data) -> str:
 
 def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
     """Return the requested restitution, that of the law for a free impact, and that of the run's impacts."""
-    asked = parameters(run)["joint"][paper.JOINT]["normal"]["restitution"]
+    asked = paper.parameters(run)["joint"][paper.JOINT]["normal"]["restitution"]
     delivered = float(run.contact_delivered_restitution.sel(contact=paper.JOINT))
     shown = (post.impact_separation_speed / post.impact_approach_speed).values
     shown = shown[np.isfinite(shown)]

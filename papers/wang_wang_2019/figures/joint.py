@@ -7,12 +7,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from flexclear.dynamics.contact.friction import modified_coulomb
-from flexclear.post.plotting import style
-from flexclear.post.single_run.series import parameters
+from flexclear.publishing import style
 from papers.wang_wang_2019.figures import Data, drawn
 from papers.wang_wang_2019.figures.phase import at_times
-from papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, comparable_until, references
+from papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, comparable_until, parameters, references
 
 #: drawn radii of socket and ball, and the direction of the ball's eccentricity
 SOCKET, DRAWN_BALL, ANGLE = 1.0, 0.74, np.radians(-38.0)
@@ -114,9 +112,10 @@ def friction_law(data: Data) -> Drawing:
 
 
 def coefficient(v: np.ndarray, v_static: float, v_dynamic: float, static: float, dynamic: float) -> np.ndarray:
-    """Return the signed friction coefficient of the runs' law at a tangential velocity v [m/s]; the force opposes v."""
-    law = getattr(modified_coulomb.coefficient, "py_func", modified_coulomb.coefficient)
-    return np.array([np.sign(one) * law(abs(one), (static, dynamic, v_static, v_dynamic)) for one in v])
+    """Return the signed friction coefficient of eqs. (28), (29) at velocities v [m/s]; the force opposes v."""
+    rise = np.clip(v / v_static, -1.0, 1.0)
+    fall = np.clip((np.abs(v) - v_static) / (v_dynamic - v_static), 0.0, 1.0)
+    return 0.5 * static * rise * (3.0 - rise**2) + np.sign(v) * (dynamic - static) * fall**2 * (3.0 - 2.0 * fall)
 
 
 def observed(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:

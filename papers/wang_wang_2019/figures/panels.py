@@ -10,8 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from flexclear.artifacts.quantities import common_times
-from flexclear.post.plotting import style
+from flexclear.publishing import style
 from papers.wang_wang_2019 import models as paper
 from papers.wang_wang_2019.figures import Data, Figure, drawn
 from papers.wang_wang_2019.models import Quantity
@@ -193,7 +192,7 @@ def _band(axes: Axes, quantity: Quantity, motion: paper.Motion, reference: paper
     low, middle, high = (_column(post[f"{name}_quantile"].sel(quantile=q)) * factor for q in (0.05, 0.5, 0.95))
     time = post.ensemble_time.values
     if reference is not None:
-        i, j = common_times(time, reference.time)
+        i, j = paper.common_times(time, reference.time)
         ideal = quantity.values(reference)[j]
         time, low, middle, high = time[i], low[i] - ideal, middle[i] - ideal, high[i] - ideal
     beyond = time >= motion.horizon

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
-from flexclear.post.plotting import style
+from flexclear.publishing import style
 from papers.wang_wang_2019.figures import Data, Figure
 from papers.wang_wang_2019.models import (
     ACCELERATION,

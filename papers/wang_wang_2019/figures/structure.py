@@ -12,13 +12,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as Drawing
 from matplotlib.text import Text
 
-from flexclear.post.plotting import style
-from flexclear.post.plotting.drawing import View, shell, triad, tube, view
-from flexclear.post.shapes.body_shape import rod_surface as surface
-from flexclear.post.shapes.body_shape import scale_to
-from flexclear.post.single_run.series import parameters
+from flexclear.publishing import View, rod_surface, scale_to, shell, style, triad, tube, view
 from papers.wang_wang_2019.figures import Data, Figure, drawn
-from papers.wang_wang_2019.models import CSJ, FAR_CB, FAR_CSJ_CB, IDEAL, JOINT
+from papers.wang_wang_2019.models import CSJ, FAR_CB, FAR_CSJ_CB, IDEAL, JOINT, parameters
 from papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE5_NORMAL_MODE
 
 LEGS = (1, 2, 3, 4)
@@ -262,10 +258,10 @@ def _shape(axes: Axes, camera: View, bundle: xr.Dataset, mode: int) -> tuple[flo
     Returns the factor of the drawn displacements [kg^0.5 m], and lower left and upper right corner of the picture [m].
     """
     q = np.zeros(bundle.sizes["mode"])
-    ghost, _ = surface(bundle, q)
+    ghost, _ = rod_surface(bundle, q)
     q[mode] = 1.0
     factor = scale_to(bundle, q, FRACTION)
-    rings, size = surface(bundle, q, factor)
+    rings, size = rod_surface(bundle, q, factor)
     shell(axes, camera, ghost, None, alpha=0.22, antialiased=False, zorder=1)
     shell(axes, camera, rings, size / max(float(size.max()), 1e-300), zorder=2)
     corner = ghost.reshape(-1, 3).min(axis=0) + np.array([0.0, 0.0, -0.055])

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.post.overview.curves import format_to_digits
-from flexclear.post.plotting.table import Table
+from flexclear.publishing import Table
 from papers.wang_wang_2019.figures import ABSENT, Data, drawn
 from papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE6, TABLE10
 
@@ -66,7 +65,12 @@ def _milliseconds(repeats: xr.DataArray) -> str:
     values = 1e3 * made(repeats)
     if not values.size:
         return ABSENT
-    return f"{np.median(values):.3g} ± {format_to_digits(0.5 * (values.max() - values.min()), 1)}"
+    return f"{np.median(values):.3g} ± {_to_digits(0.5 * (values.max() - values.min()), 1)}"
+
+
+def _to_digits(value: float, digits: int) -> str:
+    """Format a number to so many significant digits, without an exponent."""
+    return np.format_float_positional(value, digits, unique=False, fractional=False, trim="-")
 
 
 def made(repeats: xr.DataArray) -> np.ndarray:
@@ -81,7 +85,7 @@ def _ratio(timing: xr.Dataset, setting: str, name: str) -> str:
     if not own.size or not base.size:
         return ABSENT
     half = 0.0 if name == REFERENCE else 0.5 * (own.max() / base.min() - own.min() / base.max())
-    return f"{np.median(own) / np.median(base):.3g} ± {format_to_digits(half, 1)}"
+    return f"{np.median(own) / np.median(base):.3g} ± {_to_digits(half, 1)}"
 
 
 def _repeats(timing: xr.Dataset, setting: str, name: str) -> np.ndarray:
@@ -162,8 +166,8 @@ def _verdict(timing: xr.Dataset, setting: str) -> str:
         return f"{SETTINGS[setting].capitalize()}: no model of the paper's table besides the ideal one could be timed."
     least, most = min(deviations, key=deviations.__getitem__), max(deviations, key=deviations.__getitem__)
     return (
-        f"{SETTINGS[setting].capitalize()}: our ratios are {format_to_digits(deviations[least], 2)} ({least}) to "
-        f"{format_to_digits(deviations[most], 2)} ({most}) times the paper's."
+        f"{SETTINGS[setting].capitalize()}: our ratios are {_to_digits(deviations[least], 2)} ({least}) to "
+        f"{_to_digits(deviations[most], 2)} ({most}) times the paper's."
     )
 
 

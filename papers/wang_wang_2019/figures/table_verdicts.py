@@ -8,9 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from flexclear.post.plotting.table import Table
-from flexclear.scene.output import rows
-from papers import PROJECT
+from flexclear.publishing import Table
+from papers import PROJECT, rows
 from papers.wang_wang_2019 import deviations
 from papers.wang_wang_2019 import models as paper
 from papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference

@@ -21,7 +21,7 @@ from flexclear.numerics.rotations import skew
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
-def reduced(motion: np.ndarray, rigid: np.ndarray, relief: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+def frame_compliance(motion: np.ndarray, rigid: np.ndarray, relief: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
     """Return the compliance [m/N, rad/(N m)] of each frame with each held: diagonals, shape (p, p, 6).
 
     motion: of p frames per modal coordinate, axes of the frame, shape (p, 6, n). rigid: of the frames per rigid motion
@@ -45,7 +45,7 @@ def fractions(of_modes: np.ndarray, full: np.ndarray) -> np.ndarray:
 
 
 def of_bundle(bundle: xr.Dataset) -> np.ndarray:
-    """Return the compliances of a bundle's frames as `reduced` does, shape (frame, frame, 6)."""
+    """Return the compliances of a bundle's frames as `frame_compliance` does, shape (frame, frame, 6)."""
     R_BF = bundle["frame_rotation"].values
     shapes = [np.swapaxes(R_BF, 1, 2) @ bundle[f"frame_{name}_shape"].values for name in ("translation", "rotation")]
     motion = np.concatenate(shapes, axis=1)
@@ -54,7 +54,7 @@ def of_bundle(bundle: xr.Dataset) -> np.ndarray:
     rigid = np.block([[eye, arms], [np.zeros_like(arms), eye]])
     axes = np.zeros_like(rigid)
     axes[:, :3, :3] = axes[:, 3:, 3:] = np.swapaxes(R_BF, 1, 2)
-    return reduced(motion, axes @ rigid, _rigid_motions(bundle), bundle["modal_stiffness"].values)
+    return frame_compliance(motion, axes @ rigid, _rigid_motions(bundle), bundle["modal_stiffness"].values)
 
 
 def _rigid_motions(bundle: xr.Dataset) -> np.ndarray:

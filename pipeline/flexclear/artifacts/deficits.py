@@ -33,7 +33,7 @@ def table(bundle: xr.Dataset) -> str:
         f"  frequencies of the free body within 1 %: up to {resolved:.6g} Hz"
         if resolved
         else f"  frequencies of the free body within 1 %: none; the first is at {first:.6g} Hz",
-        *_imported(bundle),
+        *_lines_on_matrices(bundle),
         "  static compliance, per cent of the full model, axes of the frame",
         _row("frame", "held", bundle["direction"].values.tolist()),
     ]
@@ -55,7 +55,7 @@ def table(bundle: xr.Dataset) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _imported(bundle: xr.Dataset) -> list[str]:
+def _lines_on_matrices(bundle: xr.Dataset) -> list[str]:
     """Return lines on the matrices of a body from another program, with its frequencies next to the program's."""
     if "imported" not in bundle.attrs:
         return []
@@ -108,13 +108,13 @@ def _unmoved_frames(bundle: Labelled) -> list[str]:
 def _remedy(bundle: Labelled, used: Sequence[str]) -> str:
     """Return the remedy for missing compliance: static shapes, static shapes of all frames used, or more modes."""
     if bundle.attrs["reference"] not in STATIC:
-        return f'Add static shapes: modes = {{ reference = "craig-bampton", interfaces = {_listed(used)}, ... }}'
+        return f'Add static shapes: modes = {{ reference = "craig-bampton", interfaces = {_toml_list(used)}, ... }}'
     had = str(bundle.attrs.get("interfaces", "")).split()
     without = [name for name in used if name not in had]
     if without:
         return (
-            f"The body has no static shapes for {_listed(without)}; name all the frames used: "
-            f"modes = {{ interfaces = {_listed(used)}, ... }}"
+            f"The body has no static shapes for {_toml_list(without)}; name all the frames used: "
+            f"modes = {{ interfaces = {_toml_list(used)}, ... }}"
         )
     return f"The body has static shapes; retain more normal modes than now (count = {bundle.attrs['count']})"
 
@@ -124,5 +124,5 @@ def _percent(fraction: float) -> str:
     return f"{100.0 * fraction:.3g}" if fraction > 1e-9 else "0"
 
 
-def _listed(names: Sequence[str]) -> str:
+def _toml_list(names: Sequence[str]) -> str:
     return "[" + ", ".join(f'"{name}"' for name in names) + "]"

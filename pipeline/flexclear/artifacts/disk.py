@@ -91,14 +91,14 @@ def settle(scratch: Path, path: Path) -> str:
     return digest
 
 
-def checked(table: Mapping[str, Any]) -> bytes:
+def encode_with_digest(table: Mapping[str, Any]) -> bytes:
     """Encode a table as a file that carries its own digest: ``{"content": ..., "sha256": ...}``."""
     whole = {"content": table, "sha256": _digest(table)}
     return json.dumps(whole, indent=1, sort_keys=True, ensure_ascii=False).encode() + b"\n"
 
 
 def read_checked(path: Path) -> dict[str, Any] | None:
-    """Return the table in a file of `checked`; None when there is no such file or a bit of it has changed."""
+    """Return the table in a file of `encode_with_digest`; None without such a file, and where a bit of it has changed."""
     try:
         whole = json.loads(read_whole(path, LARGEST_TABLE))
         table = whole["content"]
@@ -157,7 +157,7 @@ def disk_limits(folder: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambda: None) -> Iterator[bool]:
+def hold_lock(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambda: None) -> Iterator[bool]:
     """Yield True when this process holds the lock file, and remove it after; call `waiting` before any wait.
 
     The operating system drops the lock of a process that dies, whatever ended it.
@@ -173,13 +173,13 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
     try:
         yield held is not None
     finally:
-        remains = held is not None and not _removed(path)  # while held: waiting processes then look for the file again
+        remains = held is not None and not _remove(path)  # while held: waiting processes then look for the file again
         lock.release()
         if remains:  # Windows removes no open file; this attempt, too, fails where another process now holds the lock
-            _removed(path)
+            _remove(path)
 
 
-def _removed(path: Path) -> bool:
+def _remove(path: Path) -> bool:
     """Remove a file; return True when it no longer exists."""
     try:
         path.unlink(missing_ok=True)
@@ -215,17 +215,17 @@ def sweep(root: Path) -> int:
             if not name.endswith((".tmp", ".part", ".lock")):
                 continue
             path = Path(folder, name)
-            if (name.endswith(".tmp") and _abandoned(path)) or (name.endswith(".part") and _old(path)):
+            if (name.endswith(".tmp") and _is_abandoned(path)) or (name.endswith(".part") and _old(path)):
                 with contextlib.suppress(OSError):  # the folder is read-only, or another process removes the file
                     path.unlink()
                     removed += 1
             elif name.endswith(".lock"):
-                with contextlib.suppress(OSError), locked(path, wait=False) as held:
+                with contextlib.suppress(OSError), hold_lock(path, wait=False) as held:
                     removed += held  # its release removes it
     return removed
 
 
-def _abandoned(path: Path) -> bool:
+def _is_abandoned(path: Path) -> bool:
     match = _TEMPORARY.fullmatch(path.name)
     if match is None:
         return False  # not a file of this program

@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 from scipy.special import stdtrit
 
-from flexclear.artifacts.points import Point, joined, unpacked
+from flexclear.artifacts.points import Point, join_points, unpack_points
 from flexclear.artifacts.quantities import separated_from
 from flexclear.numerics.rotations import rotation_between
 from flexclear.scene.quantity import CONTACT_REDUCTIONS, Quantity, Recorded
@@ -92,7 +92,7 @@ class Agreement:
         return self.error + self.chance <= self.allowed
 
     @property
-    def missed(self) -> bool:
+    def is_missed(self) -> bool:
         """True when the error exceeds the allowed error by more than chance."""
         return self.error - self.chance > self.allowed
 
@@ -110,13 +110,13 @@ def chance(members: int) -> float:
     return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * RARE))
 
 
-def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
+def compared_values(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
     """Return the recorded values by which runs are compared, without quantities that their scene does not have.
 
     owners: names of the scene's components, by kind.
     """
     there = [q for q in chosen if q.is_there(owners)]
-    every = [*(one for q in there for one in _compared(q)), *(_whole(q) for q in there if q.component)]
+    every = [*(one for q in there for one in _with_reductions(q)), *(_whole(q) for q in there if q.component)]
     every += [Recorded(q, "series") for q in there if q.kind in ("peak_force", "impulse")]
     return list({one.name: one for one in every}.values())
 
@@ -126,13 +126,15 @@ def _whole(quantity: Quantity) -> Recorded:
     return Recorded(replace(quantity, component="", text=""), "largest")
 
 
-def watched(stored: Sequence[xr.Dataset], owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> Point:
+def point_of_members(
+    stored: Sequence[xr.Dataset], owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]
+) -> Point:
     """Return the point of all members in artifacts of `stages.watched_quantities`."""
-    kept = recorded(owners, chosen)
-    return joined([(unpacked(one, kept)["point"], int(one.attrs["members"])) for one in stored])
+    kept = compared_values(owners, chosen)
+    return join_points([(unpack_points(one, kept)["point"], int(one.attrs["members"])) for one in stored])
 
 
-def _compared(quantity: Quantity) -> list[Recorded]:
+def _with_reductions(quantity: Quantity) -> list[Recorded]:
     reductions = ("series",) if quantity.of_place else CONTACT_REDUCTIONS.get(quantity.kind, OTHERS)
     return [Recorded(quantity, reduction) for reduction in reductions]
 
@@ -150,7 +152,7 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
     if quantity.kind == "impact_times":
         return _impact_times(a, b, quantity.name)
     differences, uncertainties = [], []
-    for what in _compared(quantity):
+    for what in _with_reductions(quantity):
         distance, error = _along(a, b, what, members)
         uncertainty = chance(members) * error
         differences.append(float(_beyond(distance, uncertainty).max(initial=0.0)))
@@ -170,7 +172,7 @@ def _along(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray
     deviations = [_deviations(p, what) for p in (a, b)]
     if np.array_equal(one, two) and np.array_equal(deviations[0], deviations[1]):
         return np.zeros(len(one)), np.zeros(len(one))
-    error = _pooled(np.hypot(*deviations) / np.sqrt(max(members, 1)))
+    error = _pool_errors(np.hypot(*deviations) / np.sqrt(max(members, 1)))
     if _turns(what):
         return rotation_between(*(q / np.linalg.norm(q, axis=1, keepdims=True) for q in (one, two))), error
     return np.linalg.norm(one - two, axis=1), error
@@ -271,11 +273,11 @@ def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Inf
     if quantity.kind == "impact_times":
         return _impact_times(a, b, quantity.name)
     n, error, most = len(b.members), 0.0, 0.0
-    for what in _compared(quantity):
+    for what in _with_reductions(quantity):
         distance, _ = _along(a, b, what, n)
         if np.isinf(distance).any():
             return Influence(np.inf)
-        of_pairs, allowed = _of_pairs(a, b, what), _allowed(b, what, requested)
+        of_pairs, allowed = _of_pairs(a, b, what), _allowed_error(b, what, requested)
         alike = allowed <= requested
         uncertainty = stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * np.where(alike, of_pairs, allowed / np.sqrt(n))
         error = max(error, float((_beyond(distance, uncertainty) * requested / allowed).max(initial=0.0)))
@@ -287,12 +289,12 @@ def _of_pairs(a: Point, b: Point, what: Recorded) -> np.ndarray:
     """Return the standard error of the mean difference of two ways to run a scene, by pairs of equal starts."""
     pairs = zip(a.members, b.members, strict=True)
     spread = np.std([_rows(one[what.name]) - _rows(two[what.name]) for one, two in pairs], axis=0, ddof=1)
-    return _pooled(np.linalg.norm(spread, axis=1) * (2.0 if _turns(what) else 1.0)) / np.sqrt(len(b.members))
+    return _pool_errors(np.linalg.norm(spread, axis=1) * (2.0 if _turns(what) else 1.0)) / np.sqrt(len(b.members))
 
 
-def _allowed(full: Point, what: Recorded, requested: float) -> np.ndarray:
+def _allowed_error(full: Point, what: Recorded, requested: float) -> np.ndarray:
     """Return the allowed error at each output: the requested accuracy, or the difference of two runs of the scene."""
-    scattered: np.ndarray = np.sqrt(2.0) * _pooled(_deviations(full, what))
+    scattered: np.ndarray = np.sqrt(2.0) * _pool_errors(_deviations(full, what))
     return np.maximum(requested, scattered)
 
 
@@ -311,7 +313,7 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
     if quantity.kind == "impact_times":
         return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
     results = []
-    for what in _compared(quantity):
+    for what in _with_reductions(quantity):
         distance, uncertainty = _along(planned, full, what, members)
         if np.isinf(distance).any():
             return Agreement(np.inf, 0.0, requested)
@@ -319,7 +321,7 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
         if min(len(planned.members), len(full.members)) > 1:
             of_pairs = stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, what)
             uncertainty = np.minimum(uncertainty, of_pairs)
-        error, allowed = _beyond(distance, uncertainty), _allowed(full, what, requested)
+        error, allowed = _beyond(distance, uncertainty), _allowed_error(full, what, requested)
         floor = np.maximum(allowed, np.finfo(float).tiny)  # the allowed error of a constant quantity is zero
         worst = int(np.argmax((error - uncertainty) / floor))
         if error[worst] - uncertainty[worst] <= allowed[worst]:
@@ -327,7 +329,7 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
         beyond = allowed > requested
         horizon = float(np.argmax(beyond)) / len(beyond) if beyond.any() else 1.0
         results.append(Agreement(float(error[worst]), float(uncertainty[worst]), float(allowed[worst]), horizon))
-    missed = [one for one in results if one.missed]
+    missed = [one for one in results if one.is_missed]
     worst_of = max(missed or results, key=lambda one: one.fraction)
     same = all(one.error == one.chance == 0.0 for one in results)
     return replace(worst_of, horizon=1.0 if same else results[0].horizon)  # the first result is the series, if any
@@ -340,11 +342,13 @@ def scatter(point: Point, quantity: Quantity) -> float:
     """
     if quantity.kind == "impact_times":
         return 0.0
-    spreads = [_pooled(_deviations(point, what)) for what in _compared(quantity) if what.name in point.deviation]
+    spreads = [
+        _pool_errors(_deviations(point, what)) for what in _with_reductions(quantity) if what.name in point.deviation
+    ]
     return max((float(spread.max(initial=0.0)) for spread in spreads), default=0.0)
 
 
-def _pooled(error: np.ndarray) -> np.ndarray:
+def _pool_errors(error: np.ndarray) -> np.ndarray:
     """Return the errors of a series, none below the root mean square of its neighbours."""
     width = max(1, round(POOLED * len(error)))
     around = np.convolve(
@@ -371,7 +375,7 @@ def size(point: Point, quantity: Quantity) -> float:
     if quantity.kind == "impact_times":
         return float(np.nan_to_num(point.values[f"{name}.last"]))
     if quantity.kind in ("peak_force", "impulse"):
-        return float(np.abs(point.values[_compared(quantity)[0].name]))
+        return float(np.abs(point.values[_with_reductions(quantity)[0].name]))
     values = _rows(point.values[f"{name}.series"])
     if quantity.kind == "orientation":
         return float(rotation_between(values[:1], values).max())

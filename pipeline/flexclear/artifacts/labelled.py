@@ -86,7 +86,7 @@ class LabelledArrays:
         return xr.Dataset(every, attrs=dict(self.attrs)).set_coords(list(self.coords))
 
 
-def labelled(
+def label_arrays(
     variables: Mapping[str, tuple[tuple[str, ...], Any]], coords: Mapping[str, Any], **attrs: Any
 ) -> LabelledArrays:
     """Return arrays from (dimensions, values) by name, coordinates last.

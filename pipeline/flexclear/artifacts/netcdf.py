@@ -35,9 +35,9 @@ def write(path: Path, data: LabelledArrays) -> None:
     """
     import netCDF4
 
-    listed, whole = _listed(data)
+    listed, whole = _coordinate_lists(data)
     compress = data.nbytes >= COMPRESSED
-    with _serialised(), netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+    with _lock_library(), netCDF4.Dataset(path, "w", format="NETCDF4") as file:
         for name, value in {**data.attrs, **whole}.items():
             texts = isinstance(value, (list, tuple)) and len(value) and all(isinstance(one, str) for one in value)
             (file.setncattr_string if texts else file.setncattr)(name, value)
@@ -50,7 +50,7 @@ def write(path: Path, data: LabelledArrays) -> None:
 
 
 @contextlib.contextmanager
-def _serialised() -> Iterator[None]:
+def _lock_library() -> Iterator[None]:
     """Serialise the use of the library, which is not made for threads, also against its use by xarray."""
     backend = sys.modules.get("xarray.backends.netCDF4_")  # another thread may be importing it, so it may lack its lock
     with _LOCK, getattr(backend, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
@@ -78,7 +78,7 @@ def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str
     return variable
 
 
-def _listed(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
+def _coordinate_lists(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
     """Return attribute `coordinates` by array, and that of the file for coordinates that fit no array's dimensions."""
     additional = sorted(data.coords - data.sizes.keys())
     attributes, unlisted = dict[str, dict[str, str]](), set(additional)
@@ -99,7 +99,7 @@ def read(content: bytes) -> LabelledArrays:
     """
     import netCDF4
 
-    with _serialised(), netCDF4.Dataset("in memory", memory=content) as file:
+    with _lock_library(), netCDF4.Dataset("in memory", memory=content) as file:
         file.set_auto_maskandscale(False)
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         coords = {name for name in file.variables if name in file.dimensions} | set(_taken_coordinates(attrs))

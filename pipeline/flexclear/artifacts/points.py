@@ -61,7 +61,7 @@ def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Datas
     return xr.Dataset(variables, coords={"key": ("point", np.array(list(points), dtype=object))})
 
 
-def joined(parts: Sequence[tuple[Point, int]]) -> Point:
+def join_points(parts: Sequence[tuple[Point, int]]) -> Point:
     """Return the point of all members of several points of one scene, each with its number of members (at least 1)."""
     if len(parts) == 1:
         return parts[0][0]
@@ -81,7 +81,7 @@ def joined(parts: Sequence[tuple[Point, int]]) -> Point:
     return Point(values, {}, deviation, evaluations)
 
 
-def unpacked(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Point]:
+def unpack_points(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Point]:
     """Return the points of a batch by their keys."""
     arrays = {str(name): stored[name].values for name in stored.variables}
     points = {}

@@ -77,10 +77,12 @@ def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int
 
 def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
     """Return values over time [SI], shape (time, components), of a quantity that has a value at every time."""
-    return combined(quantity.steps, lambda one: _of_part(run, one)) if quantity.steps else _of_part(run, quantity)
+    return (
+        evaluate_postfix(quantity.steps, lambda one: _of_part(run, one)) if quantity.steps else _of_part(run, quantity)
+    )
 
 
-def combined(steps: Sequence[Any], read: Callable[[Any], np.ndarray]) -> np.ndarray:
+def evaluate_postfix(steps: Sequence[Any], read: Callable[[Any], np.ndarray]) -> np.ndarray:
     """Return the values of an expression in postfix order from those of its quantities, (n, components)."""
     return fold(
         steps,
@@ -303,7 +305,7 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
     return xr.Dataset(recorded)
 
 
-def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
+def reduce_series(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
     """Return the recorded value of a series (`scene.quantity`), shape () or (components,).
 
     time: shape (n,), increasing; its steps are the weights of means. values: shape (n, components).

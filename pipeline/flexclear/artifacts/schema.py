@@ -295,11 +295,13 @@ _MAY_BE_OPEN = ("event_", "impact_")
 
 
 def conform(dataset: xr.Dataset, schema: Schema, *, title: str, **attributes: str | int | float) -> xr.Dataset:
-    """Return a dataset with units, long names and coordinates of `schema`, see `conformed`."""
-    return conformed(of(dataset), schema, title=title, **attributes).to_xarray()
+    """Return a dataset with units, long names and coordinates of `schema`, see `conform_arrays`."""
+    return conform_arrays(of(dataset), schema, title=title, **attributes).to_xarray()
 
 
-def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes: str | int | float) -> LabelledArrays:
+def conform_arrays(
+    data: LabelledArrays, schema: Schema, *, title: str, **attributes: str | int | float
+) -> LabelledArrays:
     """Return `data` with units, long names and coordinates of `schema`; raise ValueError where it differs.
 
     Every mandatory variable must be present with its dimensions; undeclared variables are errors. The attribute `units`

@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.artifacts.disk import (
-    checked,
     copy,
     digest_of,
     disk_limits,
+    encode_with_digest,
+    hold_lock,
     is_copy,
-    locked,
     publish,
     read_checked,
     read_whole,
@@ -138,7 +138,7 @@ class Store:
             attributes = getattr(product.get(MAIN), "attrs", {})  # empty where the main file is no dataset
             reported = {name: str(attributes[name]) for name in REPORTED if attributes.get(name)}
             record = Record(stage, key, digests, dict(facts), reported, computed_by or {})
-            publish(self.path(stage, key, "json"), checked(record.table()))
+            publish(self.path(stage, key, "json"), encode_with_digest(record.table()))
         return record
 
     def load(self, record: Record) -> xr.Dataset:
@@ -206,13 +206,13 @@ class Store:
             write_dataset(path, dataset)
         return path
 
-    def outdated(self, folder: str, label: str, why: str) -> None:
+    def mark_outdated(self, folder: str, label: str, why: str) -> None:
         """Write a note next to the shown files that they are outdated, and why; `show` removes the note."""
         if not folder:
             return
         with disk_limits(self.root / folder):
             self._facts(folder, label).parent.mkdir(parents=True, exist_ok=True)
-            publish(self._facts(folder, label, "failed"), checked({"label": label, "why": why}))
+            publish(self._facts(folder, label, "failed"), encode_with_digest({"label": label, "why": why}))
             self._write_outdated_note(folder)
 
     def why_outdated(self, folder: str, label: str) -> str | None:
@@ -229,7 +229,7 @@ class Store:
         with disk_limits(self.root / folder):
             (self.root / folder / ".facts").mkdir(parents=True, exist_ok=True)
             for path, (stage, facts) in paths.items():
-                publish(path, checked(Record(stage, FAMILY, {}, dict(facts)).table()))
+                publish(path, encode_with_digest(Record(stage, FAMILY, {}, dict(facts)).table()))
             for path in (self.root / folder / ".facts").glob("*.json"):
                 if path not in paths:
                     path.unlink(missing_ok=True)
@@ -263,7 +263,7 @@ class Store:
         with contextlib.ExitStack() as stack:
             with disk_limits(path.parent):
                 path.parent.mkdir(parents=True, exist_ok=True)
-                stack.enter_context(locked(path, waiting=waiting))
+                stack.enter_context(hold_lock(path, waiting=waiting))
             for leftover in path.parent.glob(f".{key}.*.tmp"):
                 leftover.unlink(missing_ok=True)
             yield

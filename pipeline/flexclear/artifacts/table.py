@@ -29,7 +29,7 @@ class Recorded(xr.Dataset):
         return table(self) if dim_order is None else super().to_dataframe(dim_order)
 
 
-def recorded(data: xr.Dataset, scene: Any = None, head: Callable[[Recorded], str] | None = None) -> Recorded:
+def with_dataframe(data: xr.Dataset, scene: Any = None, head: Callable[[Recorded], str] | None = None) -> Recorded:
     """Return the dataset of a run with its own `to_dataframe`; scene, head: see `Recorded`."""
     result = Recorded(data.data_vars, coords=data.coords, attrs=data.attrs)
     result._scene, result._head = scene, head

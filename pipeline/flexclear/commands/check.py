@@ -78,7 +78,7 @@ def command(options: argparse.Namespace) -> int:
     warnings: dict[str, InputError] = {}
     for name in options.scenes:
         refused = _show(name, options.set, quiet=options.json) if options.show else None
-        findings = examined(name, options.set, refused)
+        findings = examine(name, options.set, refused)
         errors |= {str(mistake): mistake for mistake in findings.errors}
         warnings |= {str(warning): warning for warning in findings.warnings}
         if not findings.errors and not options.json and not options.quiet:
@@ -100,7 +100,7 @@ def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | No
     """Write the start pose of a scene if it can be drawn; return the error that refuses it, or None."""
     try:
         if kind_of_file(read_toml(scenes.find_scene(name))) == SCENE:
-            scene = scenes.loaded(name, settings)
+            scene = scenes.load_by_name(name, settings)
             scenes.require_names(scene)
             return show.shown(scene, quiet=quiet)[1]
     except MISTAKES:  # listed with all others
@@ -133,7 +133,7 @@ class Findings:
         return [_record(mistake, severity) for severity, mistakes in found for mistake in mistakes]
 
 
-def examined(name: str, settings: Sequence[str] = (), refused: InputError | None = None) -> Findings:
+def examine(name: str, settings: Sequence[str] = (), refused: InputError | None = None) -> Findings:
     """Return all errors and warnings of a scene, sweep or recipe, and a description where it can be read.
 
     settings: changes of the scene, ``KEY=VALUE`` as of `--set`.  refused: error of the drawn start, which counts where
@@ -153,14 +153,14 @@ def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
 def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
     findings.attempt(lambda: refuse(dangling_names(cut(compose(path), str(path)), body_frames, str(path))))
     loaded: list[Scene] = []
-    findings.attempt(lambda: loaded.append(scenes.loaded(str(path), settings)))
+    findings.attempt(lambda: loaded.append(scenes.load_by_name(str(path), settings)))
     # bodies may share a recipe, which is meshed once
-    mesh_of = cache(partial(meshed, limits=loaded[0].limits if loaded else Limits()))
+    mesh_of = cache(partial(body_of_recipe, limits=loaded[0].limits if loaded else Limits()))
     bodies = compose(path).get("body", {}).values()
     for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
         findings.errors += mesh_of(Path(mesh))[1].errors
     for scene in loaded:
-        findings.errors += scenes.unrecorded(scene)
+        findings.errors += scenes.missing_stress_errors(scene)
         complete = findings.attempt(partial(Graph(scene).up_to, "post"), path) and not findings.errors
         for name, part in scene.flexible().items():
             findings.attempt(partial(_reference, name, part), path)
@@ -195,7 +195,7 @@ def _sweep(path: Path, settings: Sequence[str], findings: Findings) -> None:
 
 def _recipe(path: Path, settings: Sequence[str], findings: Findings) -> None:
     """Check a recipe as a scene would use it, with the default limits of a scene."""
-    body, of_mesh = meshed(path)
+    body, of_mesh = body_of_recipe(path)
     findings.errors += of_mesh.errors
     if findings.errors:
         return
@@ -225,7 +225,7 @@ class Body:
     interfaces: tuple[str, ...]
 
 
-#: type of `meshed` as a function of a recipe's path
+#: type of `body_of_recipe` as a function of a recipe's path
 MeshOf = Callable[..., tuple[Body | None, Findings]]
 
 
@@ -243,11 +243,11 @@ def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
     if set(bodies) != set(whole.recipes()):
         return
     rigid = {name: body.rigid for name, body in bodies.items()}
-    if findings.attempt(partial(_assembled, whole, rigid, findings), whole.path) and not findings.errors:
+    if findings.attempt(partial(_check_assembly, whole, rigid, findings), whole.path) and not findings.errors:
         _free_motions(whole, rigid, findings)
 
 
-def meshed(
+def body_of_recipe(
     path: Path, limits: Limits | None = None, segment: tuple[int, int] | None = None
 ) -> tuple[Body | None, Findings]:
     """Return the body of a recipe if its mesh is allowed and takes seconds (else None), with errors and warnings.
@@ -257,11 +257,11 @@ def meshed(
     findings = Findings()
     made: list[Body] = []
     if findings.attempt(partial(meshing.check_size, path, limits or Limits())):
-        findings.attempt(lambda: made.extend(_meshed(path, segment, findings)))
+        findings.attempt(lambda: made.extend(_mesh_recipe(path, segment, findings)))
     return (made[0] if made else None), findings
 
 
-def _meshed(path: Path, segment: tuple[int, int] | None, findings: Findings) -> Iterator[Body]:
+def _mesh_recipe(path: Path, segment: tuple[int, int] | None, findings: Findings) -> Iterator[Body]:
     from flexclear.structure.fe.recipe import parse
     from flexclear.structure.kinds import kind
     from flexclear.structure.modes import bundle
@@ -320,7 +320,7 @@ def _in_body(name: str) -> Iterator[None]:
         raise InputError(f"[body.{name}.{error.place}]", error.problem, error.remedy) from None
 
 
-def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
+def _check_assembly(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
     """Assemble the mechanism at its start, which checks poses, axes, loads and loose joints against each other.
 
     Flexible bodies are undeformed; of rigid mechanisms rank and drives are checked, too.
@@ -346,7 +346,7 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -
     exact = whole.start is None or whole.start.at != "equilibrium"
     refuse(start_errors(mechanism, final=exact))
     if mechanism.all_rigid and sound and exact and model.nv <= MOST_COORDINATES:
-        _started(whole, model, mobility, findings)
+        _check_start(whole, model, mobility, findings)
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):
@@ -366,7 +366,7 @@ def _as_mistakes() -> Iterator[None]:
         raise InputError("[start]", str(error)) from None
 
 
-def _started(whole: Scene, model: Model, mobility: Mobility, findings: Findings) -> None:
+def _check_start(whole: Scene, model: Model, mobility: Mobility, findings: Findings) -> None:
     """Check what the run refuses at its start, all of which is collected."""
     from flexclear.dynamics.analyses import start_refusals
 
@@ -389,10 +389,10 @@ def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
     from flexclear.dynamics.model.mechanism import build
     from flexclear.dynamics.run.run import placed
 
-    meshed = {f"{simulation.RIGID}{name}": rigid[name] for name in whole.meshed()}
+    meshed = {f"{simulation.RIGID}{name}": rigid[name] for name in whole.meshed_bodies()}
     if meshed:
         table = whole.model_dump(mode="python", exclude_none=True)
-        table["body"] = simulation.filled(table["body"], meshed)
+        table["body"] = simulation.fill_in_recipes(table["body"], meshed)
         whole = type(whole).model_validate(table)
     return build(placed(whole), {name: rigid[name] for name in whole.flexible()})
 

@@ -36,7 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring the pictures up to date and print where they are."""
-    requested = _requested(options.what, options.format)
+    requested = _subject_and_format(options.what, options.format)
     if options.at is not None and options.what != "vibrations":
         raise InputError("--at", "belongs to --what vibrations")
     time = scenes.moment(options.at)
@@ -60,7 +60,7 @@ def command(options: argparse.Namespace) -> None:
     check(outcome)
 
 
-def _requested(what: str | None, kind: str | None) -> tuple[str, str] | None:
+def _subject_and_format(what: str | None, kind: str | None) -> tuple[str, str] | None:
     """Return subject and format, None for the default ones.  Raises InputError for a format that the subject lacks."""
     if what is None and kind is None:
         return None

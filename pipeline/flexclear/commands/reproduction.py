@@ -46,7 +46,7 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
     scene = scenes.find_scene(name).resolve()
     if not scene.is_file():
         raise InputError(name, "there is no such file")
-    files, left_out = _opened(scene, settings)
+    files, left_out = _files_of_scene(scene, settings)
     try:
         top = Path(os.path.commonpath([path.parent for path in files]))
     except ValueError:
@@ -74,7 +74,7 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
         content[f"{FILES}/{path.relative_to(top).as_posix()}"] = _text(path, files) if ours else path.read_bytes()
     path = target or Path(f"{scene.stem}.repeat.zip")
     with disk_limits(path.resolve().parent):
-        publish(path.resolve(), _packed(content))
+        publish(path.resolve(), _zip_files(content))
     return path, left_out
 
 
@@ -104,7 +104,7 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
     return done.returncode == facts["exit_code"], "\n".join(differences)
 
 
-def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], list[Path]]:
+def _files_of_scene(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], list[Path]]:
     """Return all files of a scene, with True for scenes and recipes (texts of ours), and the files to leave out.
 
     Left out are files outside of the scene's folder and of this program's own scenes and meshes: they may be private,
@@ -120,11 +120,11 @@ def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], lis
     for changed in (settings, ()):
         with contextlib.suppress(FlexclearError):
             table = table_with_changes(scene, scenes.overrides(changed))
-            recipes += _named(table, "mesh")
-            others += _named(table, "file")
+            recipes += _files_under_key(table, "mesh")
+            others += _files_under_key(table, "file")
     for path in recipes:
         with contextlib.suppress(FlexclearError):
-            others += meshing.named(read_toml(path), path.parent)
+            others += meshing.named_files(read_toml(path), path.parent)
     for path in list(others):
         with contextlib.suppress(FlexclearError):
             others.extend(companions(path))
@@ -135,12 +135,12 @@ def _opened(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bool], lis
     return near, sorted(opened.keys() - near.keys())
 
 
-def _named(node: object, key: str) -> list[Path]:
+def _files_under_key(node: object, key: str) -> list[Path]:
     """Return the files that a scene's table names under a key, at any depth."""
     if isinstance(node, dict):
         own = [Path(node[key])] if isinstance(node.get(key), str) else []
-        return own + _named(list(node.values()), key)
-    return [path for item in node for path in _named(item, key)] if isinstance(node, list) else []
+        return own + _files_under_key(list(node.values()), key)
+    return [path for item in node for path in _files_under_key(item, key)] if isinstance(node, list) else []
 
 
 def _run(
@@ -196,7 +196,7 @@ def _spellings(path: PurePath) -> tuple[str, ...]:
     return json.dumps(str(path), ensure_ascii=False)[1:-1], str(path), path.as_posix()
 
 
-def _packed(content: Mapping[str, bytes]) -> bytes:
+def _zip_files(content: Mapping[str, bytes]) -> bytes:
     with tempfile.TemporaryFile() as file:
         with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, data in content.items():

@@ -34,16 +34,16 @@ def command(options: argparse.Namespace) -> int:
     if options.watch:
         if len(options.scenes) > 1:
             raise InputError("--watch", f"follows one scene, not {len(options.scenes)}", "name one")
-        from flexclear.commands.check import examined
+        from flexclear.commands.check import examine
         from flexclear.stages import live
 
         workplace = open_workplace(options) if options.run else None
-        live.follow(options.scenes[0], options.set, examined, workplace)
+        live.follow(options.scenes[0], options.set, examine, workplace)
     if options.run:
         raise InputError("--run", "shows a film on the page that follows a file", "add --watch")
     result, made = 0, dict[str, list[str]]()
     for name in options.scenes:
-        scene = scenes.loaded(name, options.set)
+        scene = scenes.load_by_name(name, options.set)
         scenes.examine(scene, options.set)
         files, refused = shown(scene, quiet=options.quiet or options.json)
         made[scene.name] = [str(file) for file in files]

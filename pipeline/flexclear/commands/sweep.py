@@ -42,7 +42,7 @@ def command(options: argparse.Namespace) -> None:
     if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(requested[0]):
         raise InputError(f"--out {options.out}", "the dataset is larger than memory", "let its name end in .zarr")
     made = {}
-    with engine(width(options.jobs), options.scheduler) as workers, workplace.limited():
+    with engine(width(options.jobs), options.scheduler) as workers, workplace.time_limit():
         for path, plan in zip(paths, requested, strict=True):
             name = scenes.with_edits(scene_name(path).removeprefix("sweeps/"), options.set)
             made[name] = bring(plan, workers, workplace, folder := workplace.store.root / "sweeps" / name)

@@ -125,7 +125,7 @@ class Simulation:
             return
         self._seen = None
         try:
-            with stopping.heeded():
+            with stopping.heed_requests():
                 if self.inputs.begin(until):
                     engine.n[m.FRESH] = 1
                     # a polynomial over a singular pose belongs to the inputs before

@@ -42,7 +42,7 @@ class _Normal(Part):
         return self
 
     @property
-    def requested(self) -> float | None:
+    def given_restitution(self) -> float | None:
         """The restitution that the scene gives, of either kind."""
         return self.restitution if self.delivered_restitution is None else self.delivered_restitution
 
@@ -122,8 +122,8 @@ class Hysteretic(_Elastic):
     """name of the law, as docs/contact.md lists them"""
 
     @model_validator(mode="after")
-    def _damped(self) -> Self:
-        if self.requested is None:
+    def _check_damping(self) -> Self:
+        if self.given_restitution is None:
             raise ValueError(f"the law '{self.law}' needs a restitution, or a delivered_restitution")
         return self
 
@@ -142,13 +142,13 @@ class KelvinVoigt(_Normal):
     @property
     def needs_mass(self) -> bool:
         """True when the damping follows from the mass that rebounds, and none is given."""
-        return self.requested is not None and self.effective_mass is None
+        return self.given_restitution is not None and self.effective_mass is None
 
     @model_validator(mode="after")
-    def _damped(self) -> Self:
-        if self.damping is None and self.requested is None:
+    def _check_damping(self) -> Self:
+        if self.damping is None and self.given_restitution is None:
             raise ValueError("the law 'kelvin-voigt' needs a damping [N s/m], or a restitution")
-        if self.damping is not None and self.requested is not None:
+        if self.damping is not None and self.given_restitution is not None:
             raise ValueError("damping and restitution are alternatives; give one")
         return self
 
@@ -216,7 +216,7 @@ class ModifiedCoulomb(_Friction):
     """sliding speed from which the coefficient is `dynamic`"""
 
     @model_validator(mode="after")
-    def _ordered(self) -> Self:
+    def _check_order(self) -> Self:
         if not self.v_static < self.v_dynamic:
             raise ValueError(
                 "v_static must be below v_dynamic, as friction falls from static to dynamic between them; "
@@ -238,7 +238,7 @@ class Ambrosio(_Friction):
     """sliding speed from which friction has its full value"""
 
     @model_validator(mode="after")
-    def _ordered(self) -> Self:
+    def _check_order(self) -> Self:
         if not self.v0 < self.v1:
             raise ValueError(
                 "v0 must be below v1, as friction rises from zero at v0 to `dynamic` at v1; "

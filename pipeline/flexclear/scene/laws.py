@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
 from flexclear.scene.fields import Angle, Part, Rate, Time
-from flexclear.scene.units import any_quantity, quantity, unit, unknown
+from flexclear.scene.units import any_quantity, quantity, unit, unknown_unit_message
 
 _TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits the quantity"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
@@ -156,7 +156,7 @@ class Column(Part):
     @classmethod
     def _known(cls, text: str) -> str:
         if text != "1" and unit(text) is None:
-            raise ValueError(f"{unknown(text)}; 1 is the unit of a number")
+            raise ValueError(f"{unknown_unit_message(text)}; 1 is the unit of a number")
         return text
 
 
@@ -233,7 +233,7 @@ class Piecewise(Part):
     """laws and their starts, in order"""
 
     @model_validator(mode="after")
-    def _ordered(self) -> Self:
+    def _check_order(self) -> Self:
         starts = [s.start for s in self.sections]
         if any(not a < b for a, b in pairwise(starts)):
             raise ValueError(f"the sections must start at increasing times, not at {starts} s")

@@ -182,10 +182,10 @@ def _odd_name(line: str) -> bool:
 def _quote_quantities(line: str) -> str:
     """Return the line with its quantities in quotation marks."""
 
-    def mended(part: re.Match[str]) -> str:
+    def quote_with_unit(part: re.Match[str]) -> str:
         if part[1] is not None or unit(part[3]) is None:
             return part[0]
         rest = part[3][len(part[3].rstrip()) :]
         return f'"{part[2]} {part[3].strip()}"{rest}'
 
-    return _PARTS.sub(mended, line)
+    return _PARTS.sub(quote_with_unit, line)

@@ -198,7 +198,7 @@ def scene_name(path: Path) -> str:
 
     Raises InputError where that cannot be the name of a folder.
     """
-    whole = _resolved(path).with_suffix("")
+    whole = _absolute_path(path).with_suffix("")
     if not whole.name.strip(".") or not whole.name.isprintable():
         raise InputError(
             terminal_text(str(path)), "cannot name a scene: results go into a folder of that name", "rename it"
@@ -212,7 +212,7 @@ def scene_name(path: Path) -> str:
     return "/".join(parts)
 
 
-def _resolved(path: Path) -> Path:
+def _absolute_path(path: Path) -> Path:
     try:
         return path.resolve()
     except (OSError, RuntimeError, ValueError) as error:  # the path loops, is too long, or contains a NUL
@@ -229,7 +229,7 @@ def is_file(path: Path) -> bool:
 
 def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     """Return the plain table of a scene file after `extends`, `replace`, `set` and `remove`."""
-    path = _resolved(path)
+    path = _absolute_path(path)
     if path in above:
         chain = " -> ".join(p.name for p in (*above, path))
         raise InputError(str(path), f"extends itself: {chain}", "break the circle")

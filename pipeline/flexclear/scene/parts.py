@@ -44,7 +44,7 @@ class BoxShape(Part):
     """pose of the box's centre in the body frame"""
 
     @model_validator(mode="after")
-    def _extended(self) -> Self:
+    def _check_size(self) -> Self:
         if min(self.size) <= 0.0:
             raise ValueError(f"the edges of a box must be longer than zero, not {list(self.size)} m")
         return self

@@ -14,7 +14,7 @@ def sources(table: Mapping[str, Any], path: str = "") -> dict[str, str]:
     return sources
 
 
-def mistaken(table: Mapping[str, Any]) -> str | None:
+def path_of_wrong_source(table: Mapping[str, Any]) -> str | None:
     """Return the path of the first `source` that is no text and no table of texts; None in validated tables."""
     for where, source in _sources(table, ""):
         texts = source.values() if isinstance(source, dict) else [source]

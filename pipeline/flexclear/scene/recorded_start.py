@@ -65,17 +65,17 @@ def _parts(file: Any, row: int, time: float) -> Iterator[tuple[str, Any]]:
     def here(name: str) -> Any:
         return file[name][row] if name in file.variables else []
 
-    def named(name: str) -> list[str]:
+    def texts_of(name: str) -> list[str]:
         return [str(text) for text in file[name][:]] if name in file.variables else []
 
     motion = [here(name) for name in ("position", "quaternion", "velocity", "angular_velocity")]
-    for k, body in enumerate(named("body")):
+    for k, body in enumerate(texts_of("body")):
         yield f"body.{body}", np.concatenate([values[k] for values in motion])
-    for name, value in zip(named("coordinate"), here("joint_position"), strict=True):
+    for name, value in zip(texts_of("coordinate"), here("joint_position"), strict=True):
         yield f"joint.{name}", [value]
-    for name, value, rate in zip(named("mode"), here("modal_coordinate"), here("modal_velocity"), strict=True):
+    for name, value, rate in zip(texts_of("mode"), here("modal_coordinate"), here("modal_velocity"), strict=True):
         yield f"modal.{name}", [value, rate]
-    for name, value in zip(named("internal"), here("internal_state"), strict=True):
+    for name, value in zip(texts_of("internal"), here("internal_state"), strict=True):
         yield f"state.{name}", [value]
     columns = ("event_time", "event_kind", "event_contact", "event_approach_speed", "event_duration")
     events = [file[name][:].tolist() for name in columns] if "event_kind" in file.variables else []

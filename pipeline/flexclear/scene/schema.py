@@ -117,7 +117,7 @@ class Accuracy(Part):
         if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
         requested = {name: value for name, value in table.items() if name not in plain}
-        accuracies = {name: _requested(name, value) for name, value in _leaves(requested, "")}
+        accuracies = {name: _accuracy_request(name, value) for name, value in _leaves(requested, "")}
         return {"quantities": accuracies} | {name: table[name] for name in plain & set(table)}
 
 
@@ -161,7 +161,7 @@ def _leaves(table: dict[str, Any], where: str) -> list[tuple[str, Any]]:
     return leaves
 
 
-def _requested(name: str, value: Any) -> Any:
+def _accuracy_request(name: str, value: Any) -> Any:
     if isinstance(value, dict):
         return value
     if isinstance(value, str) and value.rstrip().endswith("%"):
@@ -293,7 +293,7 @@ class Scene(Part):
         """Return the names of the components that may own a quantity, by kind, and whether each acts about an axis."""
         return owners(self)
 
-    def requested(self) -> list[Quantity]:
+    def requested_quantities(self) -> list[Quantity]:
         """Return the quantities that `[accuracy]` names; without it the usual ones."""
         if self.accuracy is not None and self.accuracy.quantities:
             return [parse(name, self.owners()) for name in self.accuracy.quantities]
@@ -304,13 +304,13 @@ class Scene(Part):
             if joint.type != "fixed"
         }
         hosts = self._hosts()
-        known = self._prescribed()
+        known = self._driven_bodies()
         pairs = {n: [hosts[b] for b in pair] for n, pair in joints.items()}
         free = {n: [b for b in pair if b not in known] for n, pair in pairs.items()}
         chosen = default_quantities(free if any(free.values()) else pairs, tuple([*self.contacts(), *self.stop_ends()]))
         return [parse(one.name, self.owners()) for one in chosen]
 
-    def _prescribed(self) -> set[str]:
+    def _driven_bodies(self) -> set[str]:
         """Return rigid bodies whose motion drives determine: fixed to ground, or by driven joints of one freedom."""
         driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
         prescribed = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
@@ -323,15 +323,19 @@ class Scene(Part):
                     known_bodies |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}
         return known_bodies - known
 
-    def watched(self) -> list[Quantity]:
-        """Return the quantities that are examined: those that `[view]` names, else those of `requested`."""
+    def watched_quantities(self) -> list[Quantity]:
+        """Return the quantities that are examined: those that `[view]` names, else those of `requested_quantities`."""
         if self.view is not None and self.view.watch is not None:
             return [parse(name, self.owners()) for name in self.view.watch]
-        return self.requested()
+        return self.requested_quantities()
 
     def with_requested_output(self) -> Self:
         """Return the scene without stresses and loads of flexible bodies of which no quantity is examined."""
-        asked = {term.owner.partition(".")[0] for q in (*self.requested(), *self.watched()) for term in q.terms()}
+        asked = {
+            term.owner.partition(".")[0]
+            for q in (*self.requested_quantities(), *self.watched_quantities())
+            for term in q.terms()
+        }
         output = Output.model_validate(self.output.without(self.flexible().keys() - asked))
         return self.model_copy(update={"output": output})
 
@@ -375,7 +379,7 @@ class Scene(Part):
         """Return the numbers of parts by kind, in words."""
         planes = sum(not joint.hollow for joint in self.contacts().values())
         counts = {
-            ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed()),
+            ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed_bodies()),
             ("flexible body", "flexible bodies"): len(self.flexible()),
             ("joint", "joints"): len(self.joint) - len(self.contacts()),
             ("joint with clearance", "joints with clearance"): len(self.contacts()) - planes,
@@ -404,14 +408,14 @@ class Scene(Part):
             result.setdefault(whole, []).append(name)
         return result
 
-    def meshed(self) -> dict[str, MeshedRigidBody]:
+    def meshed_bodies(self) -> dict[str, MeshedRigidBody]:
         """Return the rigid bodies with mass, inertia and frames of a mesh recipe, by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, MeshedRigidBody)}
 
     def recipes(self) -> dict[str, str]:
         """Return the mesh recipe of each body that has one, by name: flexible bodies first."""
         flexible = {name: body.mesh for name, body in self.flexible().items()}
-        return flexible | {name: body.mesh for name, body in self.meshed().items()}
+        return flexible | {name: body.mesh for name, body in self.meshed_bodies().items()}
 
     def contacts(self) -> dict[str, Clearance]:
         """Return the joints of surfaces in contact by name: with clearance, in a slot, on a plane."""

@@ -84,7 +84,7 @@ def _cut_body(table: dict[str, Any], name: str, body: Mapping[str, Any], where: 
     }
     for family in FRAMES[0]:
         if isinstance(parts := table.get(family), dict):
-            table[family] = {key: _renamed(part, host) for key, part in parts.items()}
+            table[family] = {key: _with_host_frames(part, host) for key, part in parts.items()}
     table["joint"] |= joints
     for family, key in BODIES:
         listed = table.get(family, {}).get(key) if isinstance(table.get(family), dict) else None
@@ -93,7 +93,7 @@ def _cut_body(table: dict[str, Any], name: str, body: Mapping[str, Any], where: 
             table[family] = {**table[family], key: every}
 
 
-def _renamed(part: Any, host: Mapping[str, str]) -> Any:
+def _with_host_frames(part: Any, host: Mapping[str, str]) -> Any:
     if not isinstance(part, dict):
         return part
     return {key: _frames(value, host) if key in FRAMES[1] else value for key, value in part.items()}
@@ -114,13 +114,13 @@ def body_frames(mesh: str, segment: Sequence[int] | None = None) -> list[str] | 
         return recipe_frames(mesh)
     try:
         status = Path(mesh).stat()
-        return _stored(mesh, segment[1], status.st_mtime_ns, status.st_size)[segment[0] - 1]
+        return _frames_of_recipe(mesh, segment[1], status.st_mtime_ns, status.st_size)[segment[0] - 1]
     except (OSError, ValueError, KeyError, TypeError, InputError):
         return None
 
 
 @lru_cache
-def _stored(mesh: str, count: int, changed: int, size: int) -> list[list[str]]:
+def _frames_of_recipe(mesh: str, count: int, changed: int, size: int) -> list[list[str]]:
     return _frames_of(read_toml(Path(mesh)), count)
 
 

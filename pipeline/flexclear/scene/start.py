@@ -36,7 +36,7 @@ class JointStart(Part):
     """rate at the start"""
 
     @model_validator(mode="after")
-    def _something(self) -> Self:
+    def _check_keys(self) -> Self:
         if not given_keys(self, KEYS):
             raise ValueError(f"one of {', '.join(KEYS)} must give the start of the coordinate; none is given")
         if self.position is not None and self.near is not None:

@@ -281,11 +281,11 @@ def any_quantity(value: object) -> float | str:
     if known is not None:
         return f"{quantity(value, known[1])!r} {_example(known[1], factor=1.0)}"
     if match is None or product is None:
-        raise ValueError(unknown(written, str(value)))
+        raise ValueError(unknown_unit_message(written, str(value)))
     return f"{_computable(float(match[1]) * product[0], value)!r} {si(product[1])}"
 
 
-def unknown(written: str, value: str = "") -> str:
+def unknown_unit_message(written: str, value: str = "") -> str:
     """Return the message about a text that is no unit; value: the quantity that contains the text."""
     fraction = _FRACTION.fullmatch(value.strip())
     if fraction is not None and float(fraction[2]):
@@ -299,7 +299,7 @@ def _known_unit(written: str, dimension: str, value: str) -> tuple[float, str]:
     known = unit(written)
     if known is None:
         if _FRACTION.fullmatch(value.strip()):
-            raise ValueError(unknown(written, value))
+            raise ValueError(unknown_unit_message(written, value))
         raise ValueError(f"unknown unit '{written}'; {a(dimension)} is written in {_known_units(dimension)}")
     return known
 

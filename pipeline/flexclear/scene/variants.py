@@ -263,7 +263,7 @@ def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:
     return edited(scene, changes) if changes else scene
 
 
-def uncoupled(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
+def uncoupled_paths(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
     """Return paths, such as ``body.bob``, of all parts that nothing couples to the parts with the names `asked`.
 
     Empty where a name is of no part, and where a setting refers to a part that could be removed.

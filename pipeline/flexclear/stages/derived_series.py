@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 @given_arrays
 def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progress: Progress) -> dict[str, Any]:
     """Derive the post dataset (schema POST); its attributes hold the provenance of the scene's values."""
-    from flexclear.post.single_run.series import derived
+    from flexclear.post.single_run.series import derive_arrays
 
-    return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["attributes"])}
+    return {"nc": derive_arrays(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["attributes"])}
 
 
 def params(scene: Scene) -> dict[str, Any]:

@@ -56,7 +56,7 @@ def task(scene: Scene, *, watched: bool = False) -> Task:
             "simulate": simulate,
             "title": scene.title,
             "elements": counts,
-            "units": {q.name: q.unit for q in scene.requested()},
+            "units": {q.name: q.unit for q in scene.requested_quantities()},
             "watched": watched,
         },
         context={"name": scene.name, "limits": scene.limits.written()},
@@ -107,7 +107,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from flexclear.post.answers import plan as shown
     from flexclear.post.answers.effect_sizes import chart, stay
 
-    dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
+    dataset = shown.dataset(decide_plan(params, inputs, progress), params["title"], params["units"])
     types = {name: joint["type"] for name, joint in params["simulate"]["scene"]["joint"].items()}
     dataset.attrs["staying"] = stay(variants.contacts_that_stay(types))
     progress(None, "chart")
@@ -116,16 +116,18 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     return result | chart("plan", shown.drawn(dataset), f"Effects that matter: {params['title']}", requested)
 
 
-def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> Any:
+def decide_plan(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> Any:
     """Search the plan of the scene (`core.scene.plan_decisions.Plan`)."""
     from flexclear.dynamics.plan.search import plan
 
     rigid = {name: data for name, data in inputs.items() if name.startswith(simulation.RIGID)}
     fewer = fewer_modes(inputs)
 
-    def filled(scene: Scene) -> Scene:
+    def with_rigid_numbers(scene: Scene) -> Scene:
         """Return the scene with the numbers of the rigid bodies that recipes describe."""
-        of_scene = {name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed()}
+        of_scene = {
+            name: data for name, data in rigid.items() if name.removeprefix(simulation.RIGID) in scene.meshed_bodies()
+        }
         return simulation.rebuild(simulation.params(scene), of_scene)
 
     bodies = params["simulate"]["scene"]["body"]  # types as in the scene itself, before any body is made rigid
@@ -133,7 +135,7 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     scene = simulation.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
     meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
     watched = params.get("watched", False)
-    return plan(scene, simulation.bundles(inputs), fewer, meshes, filled, progress, watched)
+    return plan(scene, simulation.bundles(inputs), fewer, meshes, with_rigid_numbers, progress, watched)
 
 
 def fewer_modes(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:

@@ -148,7 +148,7 @@ def _point(
     members: float = math.inf,
 ) -> Point:
     """Return the point of the first members, all by default, of the variant without some effects."""
-    from flexclear.artifacts.effect_size import watched
+    from flexclear.artifacts.effect_size import point_of_members
 
     k = [frozenset(names) for names in params["variants"]].index(gone)
     used: list[xr.Dataset] = []
@@ -156,7 +156,7 @@ def _point(
     while f"variant{k}/{len(used)}" in inputs and (known < members or not used):
         used.append(inputs[f"variant{k}/{len(used)}"])
         known += int(used[-1].attrs["members"])
-    return watched(used, params["owners"][k], chosen)
+    return point_of_members(used, params["owners"][k], chosen)
 
 
 def _times(outputs: Sequence[float], inputs: Mapping[str, xr.Dataset]) -> list[float]:

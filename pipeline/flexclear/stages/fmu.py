@@ -81,9 +81,9 @@ def write(scene: Scene, target: Path, asked: Mapping[str, Any], workplace: Workp
             write_dataset(Path(folder) / "body.nc", data)
             files[f"resources/{name.replace('/', '.')}.nc"] = (Path(folder) / "body.nc").read_bytes()
         identifier = re.sub(r"\W", "_", f"fmu_{scene.name}", flags=re.ASCII)
-        binary = _compiled(compiler, listed, token, standard, Path(folder))
+        binary = _compile_library(compiler, listed, token, standard, Path(folder))
         files[f"binaries/{VERSIONS[standard]}/{identifier}.so"] = binary
-        files["modelDescription.xml"] = _described(scene, identifier, listed, token, standard)
+        files["modelDescription.xml"] = _model_description(scene, identifier, listed, token, standard)
         packed = Path(folder) / "packed"
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             for name in sorted(files):  # without times, so that equal scenes give equal bytes
@@ -124,7 +124,7 @@ def _leaves(value: Any, path: str) -> Iterator[str]:
 
 
 def _outputs(scene: Scene, sim: Simulation) -> Iterator[Variable]:
-    for quantity in {one.name: one for one in scene.watched()}.values():
+    for quantity in {one.name: one for one in scene.watched_quantities()}.values():
         if quantity.over_time:
             value = sim.read(quantity.name)
             ends = QUATERNION if quantity.dim == "quat" else AXES
@@ -133,7 +133,7 @@ def _outputs(scene: Scene, sim: Simulation) -> Iterator[Variable]:
                 yield Variable(name, "output", quantity.unit, quantity=quantity.name)
 
 
-def _compiled(compiler: str, listed: list[Variable], token: str, standard: str, folder: Path) -> bytes:
+def _compile_library(compiler: str, listed: list[Variable], token: str, standard: str, folder: Path) -> bytes:
     counts = [sum(one.causality == kind for one in listed) for kind in ("input", "parameter", "output")]
     starts = ", ".join(repr(one.start or 0.0) for one in listed)
     defined = [f"#define {name} {count}" for name, count in zip(("NU", "NP", "NY"), counts, strict=True)]
@@ -149,7 +149,7 @@ def _compiled(compiler: str, listed: list[Variable], token: str, standard: str, 
     return library.read_bytes()
 
 
-def _described(scene: Scene, identifier: str, listed: list[Variable], token: str, standard: str) -> bytes:
+def _model_description(scene: Scene, identifier: str, listed: list[Variable], token: str, standard: str) -> bytes:
     """Return modelDescription.xml."""
     second, add = standard == "2", ElementTree.SubElement
     state, token_name = ("FMUstate", "guid") if second else ("FMUState", "instantiationToken")

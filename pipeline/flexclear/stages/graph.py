@@ -115,7 +115,7 @@ class Graph:
                 {"mesh": self.mesh[body]},
                 part=body,
             )
-            for body, part in self.scene.meshed().items()
+            for body, part in self.scene.meshed_bodies().items()
         }
 
     @cached_property
@@ -221,7 +221,7 @@ class Graph:
         """Return the task of the state space about the equilibrium in one pose; shown as ``state_space.nc``."""
         params = {
             **simulation.params(self.scene, without=("output",)),
-            "outputs": [quantity.written() for quantity in self.scene.watched()],
+            "outputs": [quantity.written() for quantity in self.scene.watched_quantities()],
             "pose": {"time": time, "drives": dict(drives or {}), "held": held},
         }
         return self._simulation("state_space", params)
@@ -263,7 +263,7 @@ class Graph:
     def overview(self) -> Task:
         """Task of the general figures of the run."""
         inputs = {"run": self.simulate, "post": self.post}
-        watched = {"watched": [quantity.written() for quantity in self.scene.watched()]}
+        watched = {"watched": [quantity.written() for quantity in self.scene.watched_quantities()]}
         task = self._task("overview", "evaluation:overview", watched, inputs)
         return replace(task, part="figures", folder=self._folder("figures"))
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
-    """Return the task that compiles the kernels of a scene and of all scenes with equal `shared`.
+    """Return the task that compiles the kernels of a scene and of all scenes with equal `kernel_identity`.
 
     bundles: tasks by the names of the simulate stage's inputs.
     """
@@ -34,7 +34,7 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
     )
 
 
-def shared(scene: Scene) -> tuple[str, ...]:
+def kernel_identity(scene: Scene) -> tuple[str, ...]:
     """Return a tuple that is equal for scenes that run on the same kernels: numbers are not compiled, and code
     specialised for one topology is left to the runs, a second of processor time each."""
     from flexclear.dynamics.effects import most_parts, schemes

@@ -104,7 +104,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 @contextmanager
-def served() -> Iterator[Server]:
+def serve() -> Iterator[Server]:
     """Serve in a thread while this context lasts."""
     with Server() as server:
         thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
@@ -123,13 +123,13 @@ def follow(name: str, settings: Sequence[str], examine: Examine, workplace: Work
     also run, for its film and watched curves; None: it is not run.
     """
     path, title, views, film = scenes.find_scene(name), name, list[str](), list[str]()
-    with served() as server:
+    with serve() as server:
         print(f"http://{ADDRESS}:{server.server_port}/ follows {path} until Ctrl-C", flush=True)
         while True:
             saved = Saved(files_read(path))
             refused, note = None, []
             try:
-                scene = scenes.loaded(name, settings)
+                scene = scenes.load_by_name(name, settings)
                 view, refused = show.drawn(scene)
                 title, views = show.title_of(scene), [show.figure(scene, view)]
             except FlexclearError:  # among those that `examine` returns
@@ -138,7 +138,9 @@ def follow(name: str, settings: Sequence[str], examine: Examine, workplace: Work
             records, notes = found.records(), [*note, *found.notes]
             sound = workplace is not None and not found.errors
             now = ["It runs."] if sound else ["Film and curves are those of the last version that ran."] if film else []
-            server.publish(title, [*views, *film], findings(_count(records, path), _quoted(records), [*notes, *now]))
+            server.publish(
+                title, [*views, *film], findings(_count(records, path), _with_lines(records), [*notes, *now])
+            )
             if workplace is not None and sound:
                 try:
                     with stopping.when(saved.again, "a file of the scene was saved"):
@@ -147,7 +149,7 @@ def follow(name: str, settings: Sequence[str], examine: Examine, workplace: Work
                     now = ["The film is that of the last version that ran."] if film else []
                     records.append({"severity": "error", "problem": str(error), "place": "", **dict.fromkeys(EMPTY)})
                 if not saved.again():
-                    beside = findings(_count(records, path), _quoted(records), [*notes, *now])
+                    beside = findings(_count(records, path), _with_lines(records), [*notes, *now])
                     server.publish(title, [*views, *film], beside)
             while not saved.again():
                 time.sleep(TICK)
@@ -159,7 +161,7 @@ def _film(scene: Scene, workplace: Workplace) -> list[str]:
 
     graph = Graph(scene, shown=False)
     drawn, run = workplace.made(graph.picture("motion", "html"), graph.simulate, jobs=1)
-    curves = watched_curves(run.dataset(), scene.watched()[:DRAWN])
+    curves = watched_curves(run.dataset(), scene.watched_quantities()[:DRAWN])
     views = [figures_of(drawn.text(name)) for name in drawn.record.files]
     return views if curves is None else [*views, media("watched.png", curves, "Watched quantities")]
 
@@ -196,7 +198,7 @@ def _count(records: Sequence[Mapping[str, Any]], path: Path) -> str:
     return f"{path.name}: {', '.join(counts)}"
 
 
-def _quoted(records: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+def _with_lines(records: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
     """Yield the records with the text of their line, whose file and number their place need not repeat."""
     for record in records:
         text, place = "", record["place"]

@@ -41,7 +41,7 @@ def params(
     factor = changes.pop("elements", None)
     if factor is not None and isinstance(table.get("elements"), int):
         changes["elements"] = factor * table["elements"]
-    for path in named(table, recipe.parent):
+    for path in named_files(table, recipe.parent):
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     sources(recipe)
@@ -54,7 +54,7 @@ def params(
 def sources(recipe: Path, where: str = "") -> dict[str, str]:
     """Return the provenance of a recipe's values: key path -> text; raise InputError for a source that is not text."""
     table = read_toml(recipe)
-    wrong = provenance.mistaken(table)
+    wrong = provenance.path_of_wrong_source(table)
     if wrong is not None:
         problem = "expected text, or a table of texts by key"
         raise InputError(f"{recipe} [{wrong}]", problem, 'write source = "Table 2"')
@@ -74,11 +74,11 @@ def kind_of(recipe: Path) -> str:
 
 def files(table: Mapping[str, Any], folder: Path) -> dict[str, Path]:
     """Return the files that a recipe names, and those read with them, by their paths relative to the recipe."""
-    opened = [file for path in named(table, folder) for file in (path, *companions(path))]
+    opened = [file for path in named_files(table, folder) for file in (path, *companions(path))]
     return {_relative(path, folder): path for path in opened}
 
 
-def named(table: Mapping[str, Any], folder: Path) -> list[Path]:
+def named_files(table: Mapping[str, Any], folder: Path) -> list[Path]:
     """Return the paths of the files that a recipe itself names."""
     shape = table.get("shape")
     return [folder / str(shape[key]) for key in FILES if key in shape] if isinstance(shape, Mapping) else []

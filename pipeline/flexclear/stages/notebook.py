@@ -33,7 +33,7 @@ def run_head(run: Recorded) -> str:
     from flexclear.artifacts.table import scene_of
     from flexclear.post.overview.figures import watched_curves
 
-    picture, time = watched_curves(run, scene_of(run).watched()[:DRAWN], width=6.0), run["time"].values
+    picture, time = watched_curves(run, scene_of(run).watched_quantities()[:DRAWN], width=6.0), run["time"].values
     rows = {"recorded": f"{time[0]:g} to {time[-1]:g} s, {len(time)} rows"}
     rows |= {label: str(run.attrs[name]) for name, label in COST.items() if name in run.attrs}
     cells = "".join(f"<tr><th>{label}</th><td>{html.escape(text)}</td></tr>" for label, text in rows.items())

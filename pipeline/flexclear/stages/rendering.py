@@ -43,10 +43,10 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
         view = scene.view.model_dump(mode="json", exclude={"watch", "source"}, exclude_none=True)
         values |= {"view": view} if view else {}
     if (what == "joint" and kind in ("png", "html")) or (what in FILMED and kind in ("gif", "mp4")):
-        terms = [term for quantity in scene.watched() for term in quantity.terms()]
+        terms = [term for quantity in scene.watched_quantities() for term in quantity.terms()]
         values["watched"] = list(dict.fromkeys(term.owner for term in terms if term.owner))
         if what in FILMED and scene.view is not None and scene.view.watch is not None:
-            values["curves"] = [quantity.written() for quantity in scene.watched()]
+            values["curves"] = [quantity.written() for quantity in scene.watched_quantities()]
     return values
 
 

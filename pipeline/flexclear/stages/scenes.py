@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from flexclear.artifacts import maintenance
-from flexclear.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
+from flexclear.artifacts.disk import disk_limits, encode_with_digest, publish, read_checked, sha256
 from flexclear.artifacts.paths import DATA, results_root
 from flexclear.artifacts.store import PARTIAL, Store
 from flexclear.post.pages import media
@@ -76,7 +76,7 @@ def tables(made: Made, *names: str) -> str:
     return "".join(as_html(from_markdown(made.text(name))) for name in names)
 
 
-def joined(names: Sequence[str]) -> str:
+def joint_folder_name(names: Sequence[str]) -> str:
     """Return the name of a folder for results of several scenes."""
     return "+".join(name.replace("/", "_").replace(" ", "_") for name in names)
 
@@ -111,9 +111,9 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: a worker would run a caller's script again from its top
     (made,) = workplace.datasets(task, jobs=1)
-    from flexclear.artifacts.table import recorded
+    from flexclear.artifacts.table import with_dataframe
 
-    return recorded(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)), scene, run_head)
+    return with_dataframe(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)), scene, run_head)
 
 
 def results(scene: Scene | str | Path) -> xr.DataTree:
@@ -248,7 +248,7 @@ def overrides(settings: Sequence[str]) -> dict[str, object]:
     return changes
 
 
-def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
+def load_by_name(name: str, settings: Sequence[str] = ()) -> Scene:
     """Load the scene called `name` and apply `settings`; its own name then contains them, and so do its results.
 
     Raises InputErrors; where only some parts cannot be read, also for the others.
@@ -293,7 +293,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
     wrong: list[InputError] = []
     for name in names:
         try:
-            graph = Graph(loaded(name, settings))
+            graph = Graph(load_by_name(name, settings))
             examine(graph.scene, settings)
             with in_file(graph.scene.path):
                 graph.up_to("post")
@@ -337,10 +337,10 @@ def require_names(scene: Scene) -> None:
     """Raise InputErrors for dangling names in a scene, before any mesh or mode is computed for it."""
     table = scene.model_dump(mode="python", exclude_none=True)
     where = str(scene.path or scene.name)
-    refuse([*dangling_names(table, body_frames, where), *unrecorded(scene)])
+    refuse([*dangling_names(table, body_frames, where), *missing_stress_errors(scene)])
 
 
-def unrecorded(scene: Scene) -> Iterator[InputError]:
+def missing_stress_errors(scene: Scene) -> Iterator[InputError]:
     """Yield an error for each requested stress that the body's recipe does not give."""
     requested = [(f"accuracy.{name}", name) for name in (scene.accuracy.quantities if scene.accuracy else ())]
     requested += [("view.watch", name) for name in (scene.view and scene.view.watch) or ()]
@@ -434,7 +434,7 @@ def claim(scene: Scene, store: Store) -> str | None:
         return None
     with disk_limits(note.parent):
         note.parent.mkdir(parents=True, exist_ok=True)
-        publish(note, checked({"file": str(path)}))
+        publish(note, encode_with_digest({"file": str(path)}))
     if not isinstance(before, str) or not is_file(Path(before)):
         return None
     return f"results/runs/{scene.name} showed {before} and now shows {path}, which has the same name"

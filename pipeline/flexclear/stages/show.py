@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> tuple[list[Path], InputError | None]:
     """Write picture and page, and print where they are; return the files, and the start's error or None."""
     with scenes.in_file(scene.path):
-        view, refused = viewed(scene)
+        view, refused = draw_start(scene)
     files = files_of(scene, view, Path.cwd() if folder is None else folder, quiet=quiet)
     if not quiet:
         print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
@@ -103,13 +103,13 @@ notebook.PICTURES.append(_small)
 
 
 def drawn(scene: Scene) -> tuple[StartView, InputError | None]:
-    """Return the start pose as `viewed` does, of a scene whose names are checked; errors say the file."""
+    """Return the start pose as `draw_start` does, of a scene whose names are checked; errors say the file."""
     scenes.require_names(scene)
     with scenes.in_file(scene.path):
-        return viewed(scene)
+        return draw_start(scene)
 
 
-def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
+def draw_start(scene: Scene) -> tuple[StartView, InputError | None]:
     """Return the start pose with its names, and the error that refuses it.  Raises InputError if none can be drawn."""
     from flexclear.dynamics.model.start_pose import start_pose
     from flexclear.dynamics.run.run import placed
@@ -118,7 +118,7 @@ def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
 
     bodies = {name: _body(scene.body[name], Path(recipe)) for name, recipe in scene.recipes().items()}
     looks = rendering.params(scene, "motion", "pvd")
-    filled = _filled(scene, bodies, lone := _unplaced(scene))
+    filled = _with_numbers(scene, bodies, lone := _unplaced_bodies(scene))
     pose = start_pose(filled, placed(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
     gaps = [Missing(gap.joint, gap.start, gap.end, gap.angle) for gap in pose.gaps]
     view = start_view(pose.data, bodies, gaps, Looks(bodies=looks.get("bodies", {}), **looks.get("view", {})))
@@ -176,20 +176,22 @@ def _body(body: Any, recipe: Path) -> xr.Dataset:
     return bundle.drawn(kind.build(table, recipe.parent, segment=body.segment))
 
 
-def _unplaced(scene: Scene) -> list[str]:
+def _unplaced_bodies(scene: Scene) -> list[str]:
     """Return the bodies that neither a pose nor a joint places, as in scenes about a body's modes alone."""
     joined = {frame.partition(".")[0] for joint in scene.joint.values() for frame in joint.between}
     paths = {drive.frame.partition(".")[0] for drive in scene.drive.values() if hasattr(drive, "frame")}
     return [n for n, b in scene.body.items() if getattr(b, "pose", b) is None and n not in joined | paths]
 
 
-def _filled(scene: Scene, bodies: dict[str, xr.Dataset], lone: list[str]) -> Scene:
+def _with_numbers(scene: Scene, bodies: dict[str, xr.Dataset], lone: list[str]) -> Scene:
     """Return the scene with numbers instead of the recipes of rigid bodies, and without deformation at the start.
 
     lone: bodies that are put at the origin.
     """
     table = scene.model_dump(mode="python", exclude_none=True)
-    table["body"] = simulation.filled(table["body"], {f"{simulation.RIGID}{n}": bodies[n] for n in scene.meshed()})
+    table["body"] = simulation.fill_in_recipes(
+        table["body"], {f"{simulation.RIGID}{n}": bodies[n] for n in scene.meshed_bodies()}
+    )
     table.get("start", {}).pop("modal", None)
     for name in lone:
         table["body"][name]["pose"] = {}

@@ -149,14 +149,14 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, Labelled] | None = N
     from flexclear.scene.schema import Scene
 
     table, name = params["scene"], str(params.get("name", "scene"))
-    body = filled(table["body"], inputs or {})
+    body = fill_in_recipes(table["body"], inputs or {})
     own = {"body": body, "title": name, "limits": params.get("limits", UNLIMITED)}
     scene = Scene.model_validate({**table, **own})
     scene._name = name
     return scene
 
 
-def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[str, Any]:
+def fill_in_recipes(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[str, Any]:
     """Return the table of bodies with numbers from the inputs ``rigid/<body>`` instead of recipes."""
     import numpy as np
 

@@ -32,7 +32,7 @@ def plain(scene: Scene) -> Scene:
 
 
 def tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list[Task]:
-    """Return the tasks of a variant, one for each batch of members; `effect_size.watched` reads their artifacts."""
+    """Return the tasks of a variant, one per batch of members; `effect_size.point_of_members` reads their artifacts."""
     variant = plain(scene)
     graph, count = Graph(variant, shown=False), _members(variant, members)
     ends = [*(end for end in BATCHES if end < count), count]
@@ -65,7 +65,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     Its attributes `compile_seconds` and `cpu_seconds` are the processor time of the kernels and of the runs [s], and
     `members` is the number of runs.
     """
-    from flexclear.artifacts.effect_size import recorded
+    from flexclear.artifacts.effect_size import compared_values
     from flexclear.artifacts.points import batch
 
     scene = simulation.rebuild(params["simulate"], inputs)
@@ -82,7 +82,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         "compile_seconds": compiled - begun,
         "cpu_seconds": kernels.processor_time() - compiled,
     }
-    return {"nc": batch({"point": point}, recorded(scene.owners(), chosen)).assign_attrs(spent)}
+    return {"nc": batch({"point": point}, compared_values(scene.owners(), chosen)).assign_attrs(spent)}
 
 
 def watch(
@@ -90,7 +90,7 @@ def watch(
 ) -> Point:
     """Run a scene in this process and return the point of its members from number `first` on; without contacts they are
     ignored."""
-    from flexclear.artifacts.effect_size import recorded
+    from flexclear.artifacts.effect_size import compared_values
     from flexclear.dynamics.record.point import Runner
 
-    return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members), first=first).run(scene)
+    return Runner(bundles, compared_values(scene.owners(), chosen), _members(scene, members), first=first).run(scene)

@@ -133,7 +133,7 @@ class Workplace:
 
     def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
         """Bring tasks up to date in at most `jobs` processes; default: this workplace's, else the number of cores."""
-        with self.limited():
+        with self.time_limit():
             return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
 
     def artifacts(self, outcome: Outcome) -> dict[Task, Made]:
@@ -151,7 +151,7 @@ class Workplace:
         """Bring tasks up to date and return their main files."""
         return [one.dataset() for one in self.made(*tasks, jobs=jobs)]
 
-    def limited(self) -> AbstractContextManager[None]:
+    def time_limit(self) -> AbstractContextManager[None]:
         """Return a context that stops the work inside when the command's time limit is over."""
         end, why = self.end
         return stopping.until(None if end == math.inf else end - time.monotonic(), why)

@@ -74,7 +74,7 @@ def dataset(
     budget: processor time [s], or text such as "2min".  models: as in `cost.bring`, for the study.  of: as of
     `Answers`. Raises as `answer_of`.
     """
-    from flexclear.post.answers.answered import answered
+    from flexclear.post.answers.answered import with_answer
 
     # in this process: a worker would run a caller's script again from its top
     workplace, given = replace(open_workplace(), jobs=1), None if budget is None else seconds(budget, "budget")
@@ -84,7 +84,7 @@ def dataset(
         answer = answer_of(name, scene, workplace, given, of)
     words = shown_answer(name, answer, scene)
     picture = answer.read(words.picture) if words.picture in answer.record.files else None
-    return answered(answer.dataset(), words.text, picture, words.table)
+    return with_answer(answer.dataset(), words.text, picture, words.table)
 
 
 def answer_of(name: str, scene: Scene, workplace: Workplace, budget: float | None, of: Sequence[str] = ()) -> Made:

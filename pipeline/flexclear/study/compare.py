@@ -10,7 +10,7 @@ from flexclear.post.pages import Part, page
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import EFFECTS, ideal, replaceable_contacts
 from flexclear.stages.graph import Graph
-from flexclear.stages.scenes import joined, pictures, tables
+from flexclear.stages.scenes import joint_folder_name, pictures, tables
 from flexclear.stages.workplace import Made, Workplace, check, open_workplace
 from flexclear.study import members
 from flexclear.system.errors import InputError, of_trial
@@ -46,7 +46,7 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
     graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(labels, sides, strict=True)}
     runs = workplace.bring([graph.simulate for graph in graphs.values()])
     check(runs)
-    chosen = [q for side in sides for q in side.watched()]
+    chosen = [q for side in sides for q in side.watched_quantities()]
     tight = dict[str, Task]()
     for label, graph in graphs.items():
         task = members.tighter(graph.scene, members.setting_of(graph.scene, workplace), chosen)
@@ -66,13 +66,13 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
 
 def dataset(scenes: list[Scene], without: str | None = None) -> xr.Dataset:
     """Return the comparison that `bring` makes, as a dataset that shows it in a notebook."""
-    from flexclear.post.answers.answered import answered
+    from flexclear.post.answers.answered import with_answer
 
     made = bring(scenes, open_workplace(), without)
     data, picture = made.dataset(), next(iter(PICTURES))
     names = ", ".join(map(str, data["run"].values))
     drawn = made.read(picture) if picture in made.record.files else None
-    return answered(data, f"Compared: {names}", drawn, tables(made, *TABLES))
+    return with_answer(data, f"Compared: {names}", drawn, tables(made, *TABLES))
 
 
 def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
@@ -98,7 +98,7 @@ def parts(made: Made) -> list[Part]:
 
 
 def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
-    quantities = {q.name: q.written() for graph in graphs.values() for q in graph.scene.watched()}
+    quantities = {q.name: q.written() for graph in graphs.values() for q in graph.scene.watched_quantities()}
     labels = list(graphs)
     inputs = {f"run{k}": graphs[label].simulate for k, label in enumerate(labels)}
     inputs |= {f"tight{k}": tight[label] for k, label in enumerate(labels) if label in tight}
@@ -109,6 +109,6 @@ def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
         params={"labels": labels, "quantities": list(quantities.values())},
         inputs=inputs,
         code=("flexclear.post",),
-        folder=f"compare/{joined(labels)}",
+        folder=f"compare/{joint_folder_name(labels)}",
         names={"nc": "compare.nc"},
     )

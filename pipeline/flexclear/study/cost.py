@@ -118,7 +118,7 @@ class Study:
     @property
     def _chosen(self) -> list[Quantity]:
         """Quantities of the scene's `[accuracy]`, else those that it watches."""
-        return self.scene.requested() if self.scene.accuracy is not None else self.scene.watched()
+        return self.scene.requested_quantities() if self.scene.accuracy is not None else self.scene.watched_quantities()
 
     @cached_property
     def _neighbours(self) -> list[cost_design.Design]:
@@ -183,7 +183,7 @@ class Study:
         """Compute points in this order; skip those that a part of the budget or the limit of a point does not allow."""
         for design in (one for one in designs if one.key not in self.runs):
             evaluations = design.evaluations(self.evaluations, self.own)
-            compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
+            compiling = COMPILING if kernels.kernel_identity(design.scene) not in self.compiled else 0.0
             allowed = self.budget.allows(evaluations * self.seconds_each + POINT + compiling, part)
             if not allowed or (design.chooses_steps and evaluations > self._evaluation_limit()):
                 self.undone.append(design)
@@ -200,7 +200,7 @@ class Study:
         elif self.own:
             limit = min(self.scene.solver.evaluations, self._evaluation_limit())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
-        first, compiled = kernels.shared(design.scene) not in self.compiled, self._kernels(design)
+        first, compiled = kernels.kernel_identity(design.scene) not in self.compiled, self._kernels(design)
         task = members.point(design, members.names_of(self.scene), compiled, run)
         record, *kernel = self.workplace.datasets(*([task, compiled] if first else [task]))
         self.runs[design.key] = task
@@ -225,7 +225,7 @@ class Study:
         return next(factor * below for factor in (1, 2, 5, 10) if factor * below >= affordable)
 
     def _kernels(self, design: cost_design.Design) -> Task:
-        shared = kernels.shared(design.scene)
+        shared = kernels.kernel_identity(design.scene)
         if shared not in self.compiled:
             self.compiled[shared] = kernels.task(design.scene, members.bundles(design))
         return self.compiled[shared]

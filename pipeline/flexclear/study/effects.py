@@ -70,7 +70,7 @@ def rank(
     own: setting and processor time [s] of the scene's own run.  levels: numbers of members that are tried until a
     change beyond the horizon is decided.  of: as of `bring`, with the same errors.
     """
-    from flexclear.post.answers.effect_ranking import IDEAL, Pair, undecided
+    from flexclear.post.answers.effect_ranking import IDEAL, Pair, undecided_quantities
 
     effects, chosen = _examined(scene, of)
     removed, (setting, seconds) = _removed(scene, effects, IDEAL), own
@@ -82,7 +82,7 @@ def rank(
 
         def more(members: int, points: Mapping[Names, Point]) -> Collection[Names]:
             pairs = {gone: Pair(points[full], point, members) for gone, point in points.items() if gone}
-            return [gone for gone, pair in pairs.items() if undecided(pair, chosen)]
+            return [gone for gone, pair in pairs.items() if undecided_quantities(pair, chosen)]
 
         reached = runs.until_decided(made, levels, more)
         if tight or not runs.refused:
@@ -101,7 +101,11 @@ def rank(
 
 def _examined(scene: Scene, of: Sequence[str]) -> tuple[tuple[Effect, ...], list[Quantity]]:
     """Return the effects that can be removed and the watched quantities; InputError without one of them."""
-    effects, chosen, where = variants.effects_of(scene, of, f"{scene.name} --of"), scene.watched(), scene.path
+    effects, chosen, where = (
+        variants.effects_of(scene, of, f"{scene.name} --of"),
+        scene.watched_quantities(),
+        scene.path,
+    )
     if not effects:
         raise InputError(
             str(where or scene.name),

@@ -105,7 +105,7 @@ class Members:
 
     def points(self, variants: Mapping[Name, Scene], members: int) -> dict[Name, Point]:
         """Return the points of variants over this number of members; of one run where a variant has no contacts."""
-        from flexclear.artifacts.effect_size import watched
+        from flexclear.artifacts.effect_size import point_of_members
 
         tasks = {name: watched_quantities.tasks(scene, self.chosen, members) for name, scene in variants.items()}
         made = iter(self.workplace.made(*(task for few in tasks.values() for task in few)))
@@ -118,7 +118,7 @@ class Members:
             self.seconds[name] = float(last["cpu_seconds"]) / float(last["members"])
             self.budget.spent += self._predict(name, variants[name], members) + float(last["compile_seconds"])
             self.known[name] = members
-            points[name] = watched(stored, variants[name].owners(), self.chosen)
+            points[name] = point_of_members(stored, variants[name].owners(), self.chosen)
             self.refused = self.refused or bool(points[name].refused)
         return points
 
@@ -155,8 +155,8 @@ def bundles(design: Design) -> dict[str, Task]:
 def names_of(scene: Scene, others: Iterable[Quantity] = ()) -> list[str]:
     """Return the quantities that the points of a scene keep: requested, watched, and `others` that it has."""
     owners = scene.owners()
-    asked = scene.requested() if scene.accuracy is not None else []
-    return list(dict.fromkeys(q.name for q in (*asked, *scene.watched(), *others) if q.is_there(owners)))
+    asked = scene.requested_quantities() if scene.accuracy is not None else []
+    return list(dict.fromkeys(q.name for q in (*asked, *scene.watched_quantities(), *others) if q.is_there(owners)))
 
 
 def tighter_design(scene: Scene, own: Setting) -> Design | None:

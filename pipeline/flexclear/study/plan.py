@@ -63,7 +63,7 @@ def with_accuracy(scene: Scene, level: str) -> Scene:
             raise ValueError("it must be above 0 and below 1")
     except ValueError as error:
         raise InputError(f"accuracy {level}", f"is no fraction: {error}", "write a number with %, as '1 %'") from None
-    chosen = {quantity.name: {"relative": fraction} for quantity in scene.watched()}
+    chosen = {quantity.name: {"relative": fraction} for quantity in scene.watched_quantities()}
     if not chosen:
         raise InputError(str(scene.path or scene.name), "watches no quantity", "name quantities in [view] watch")
     asked = edited(scene, {"accuracy": chosen})
@@ -87,8 +87,8 @@ def dataset(scene: Scene, level: str | None, budget: str | float | None) -> Resu
     level: accuracy of all watched quantities; None for that of the scene, else LEVEL.  budget: time for `errors_of`
     [s], or text; None leaves the errors out.
     """
-    from flexclear.post.answers.answered import answered
-    from flexclear.post.answers.plan import verified, words
+    from flexclear.post.answers.answered import with_answer
+    from flexclear.post.answers.plan import verification_table, words
 
     workplace = open_workplace()
     planned = bring(scene, workplace, level or (LEVEL if scene.accuracy is None else None))
@@ -98,8 +98,8 @@ def dataset(scene: Scene, level: str | None, budget: str | float | None) -> Resu
         result = result.assign(
             {name: compared[name] for name in ("requested", "error", "chance", "allowed", "horizon", "scatter")}
         )
-        table = as_html(verified(compared)) + table
-    return Result(planned.planned, answered(result, words(result), planned.made.read("plan.png"), table))
+        table = as_html(verification_table(compared)) + table
+    return Result(planned.planned, with_answer(result, words(result), planned.made.read("plan.png"), table))
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class Planned:
 
 def _example(scene: Scene) -> str:
     """Return an entry that this scene's `[accuracy]` could have."""
-    watched = next((quantity for quantity in scene.watched() if quantity.kind == "position"), None)
+    watched = next((quantity for quantity in scene.watched_quantities() if quantity.kind == "position"), None)
     body = watched.owner if watched is not None else next(iter(scene.rigid()), "body")
     return f'{body}.position = "10 um"'
 
@@ -169,7 +169,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     bare = variants.without(scene, variants.effects_by_name(scene, decided["gone"], f"{scene.name} [plan]"))
     fewer = without_parts(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
-    watch = [q.name for q in scene.watched() if q.is_there(owners)]
+    watch = [q.name for q in scene.watched_quantities() if q.is_there(owners)]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
     solver: dict[str, Any] = {key: decided[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in decided}
     if "evaluations" in scene.solver.model_fields_set:
@@ -211,10 +211,10 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
 
     budget: processor time for members that decide the verdicts [s].
     """
-    from flexclear.post.answers.plan import agreement_of, verified
+    from flexclear.post.answers.plan import agreement_of, verification_table
 
     compared = errors_of(planned, workplace, budget)
-    print(as_markdown(verified(compared)))
+    print(as_markdown(verification_table(compared)))
     if planned.scene.accuracy is not None and planned.scene.accuracy.allow_missed:
         return []
     verdicts = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
@@ -222,7 +222,7 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
     return [
         f"{planned.scene.name}: the plan misses {name}: {one.error:.3g} instead of {one.allowed:.3g} {unit}"
         for name, unit, one in columns
-        if one.missed
+        if one.is_missed
     ]
 
 

@@ -87,7 +87,7 @@ class _Sink:
     def take(self, finished: Sequence[tuple[Job, Point]], report: Callable[[float, str], None]) -> None:
         """Add finished points and report the progress."""
         self.waiting += finished
-        self.done |= {job.key: sweep_large.stripped(point) if self.large else point for job, point in finished}
+        self.done |= {job.key: sweep_large.without_values(point) if self.large else point for job, point in finished}
         self.fresh += len(finished)
         self.refused += sum(bool(point.refused) for _, point in finished)
         since = time.monotonic() - self.begun

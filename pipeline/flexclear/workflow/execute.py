@@ -31,7 +31,7 @@ def key_of(task: Task, inputs: Mapping[str, Record], sources: Sources) -> str:
 
 def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
     """Show an up-to-date artifact in its task's folder and return its record; None when there is none."""
-    record = _stored(task, inputs, store, sources)
+    record = _find_stored(task, inputs, store, sources)
     if record is not None:
         store.show(record, task.folder, task.names, task.label)
     return record
@@ -45,7 +45,9 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
     known = _facts(task, inputs, sources)
     name = key(known)
     with store.lock(task.stage, name, lambda: progress(None, "waiting for another process with the same task")):
-        record = _stored(task, inputs, Store(store.root), sources)  # silent store: `find` has reported faults already
+        record = _find_stored(
+            task, inputs, Store(store.root), sources
+        )  # silent store: `find` has reported faults already
         if record is None:
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
@@ -81,7 +83,7 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
         return State(task, None, ("never run",))
     above = [f"its input {name} would be computed again" for name in sorted(stale)]
     if not stale:
-        record = _stored(task, fresh, store, sources)
+        record = _find_stored(task, fresh, store, sources)
         if record is not None:
             return State(task, record, ())
     why = reasons(now, None if last is None else last.facts, stale) + above
@@ -94,7 +96,7 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
     return State(task, None, tuple(why))
 
 
-def _stored(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
+def _find_stored(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
     return store.find(task.stage, key_of(task, inputs, sources))
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from flexclear.artifacts.disk import checked, publish, read_checked
+from flexclear.artifacts.disk import encode_with_digest, publish, read_checked
 from flexclear.artifacts.paths import TREE as TREE
 
 #: packages whose modules count by their code: the program, and applications next to its sources in a checkout
@@ -80,7 +80,7 @@ class Sources:
         if self.memo is not None and any(self.remembered.get(path) != of for path, of in found.items()):
             self.remembered.update(found)
             with contextlib.suppress(OSError):
-                publish(self.memo, checked(self.remembered))
+                publish(self.memo, encode_with_digest(self.remembered))
         return found
 
     def _folder(self, name: str) -> Path:
@@ -92,7 +92,9 @@ class Sources:
             source = (self._folder(path.replace("/", ".")) / path).read_bytes()
             known = self.remembered.get(path, [""])
             text = hashlib.sha256(source).hexdigest()
-            self.read[path] = known if known[0] == text else [text, *_examined(source, path.endswith(".py"))]
+            self.read[path] = (
+                known if known[0] == text else [text, *_digest_and_libraries(source, path.endswith(".py"))]
+            )
         return self.read[path]
 
 
@@ -115,12 +117,12 @@ def _digest_of(files: dict[str, list[Any]]) -> str:
 
 
 @cache
-def _examined(source: bytes, module: bool) -> tuple[str, list[str]]:
+def _digest_and_libraries(source: bytes, module: bool) -> tuple[str, list[str]]:
     """Return the digest of the code of a file, and the libraries that it imports."""
     if not module:
         return hashlib.sha256(source).hexdigest(), []
-    tree = _parsed(source)
-    libraries = set(_imported(tree)) - {*OWN, *sys.stdlib_module_names}
+    tree = _parse(source)
+    libraries = set(_top_level_imports(tree)) - {*OWN, *sys.stdlib_module_names}
     return code_digest(tree), sorted(libraries)
 
 
@@ -144,7 +146,7 @@ def code_digest(tree: ast.Module) -> str:
                     part.values = []
                 elif isinstance(part, ast.Constant) and isinstance(part.value, str):
                     part.value = ""
-    return hashlib.sha256(_dumped(tree).encode()).hexdigest()
+    return hashlib.sha256(_tree_text(tree).encode()).hexdigest()
 
 
 def _is_text(statement: ast.stmt) -> bool:
@@ -153,7 +155,7 @@ def _is_text(statement: ast.stmt) -> bool:
     return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
-def _dumped(tree: ast.Module) -> str:
+def _tree_text(tree: ast.Module) -> str:
     """Return a syntax tree as text, equal in all releases of Python: some omit empty fields, some lack them."""
     whole: dict[str, Any] = {"show_empty": True} if sys.version_info >= (3, 13) else {}
     return ast.dump(tree, **whole).replace(", type_params=[]", "")
@@ -162,7 +164,7 @@ def _dumped(tree: ast.Module) -> str:
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
-def _parsed(source: bytes) -> ast.Module:
+def _parse(source: bytes) -> ast.Module:
     """Return the syntax tree. CPython counts the nesting depth of all threads together and may find the count wrong.
 
     This occurs at least in 3.11 and 3.12 (its issue 106905); runs, perturbed runs and ensemble members are threads.
@@ -173,7 +175,7 @@ def _parsed(source: bytes) -> ast.Module:
     return ast.parse(source)
 
 
-def _imported(tree: ast.Module) -> Iterator[str]:
+def _top_level_imports(tree: ast.Module) -> Iterator[str]:
     """Yield the top-level names that a module imports anywhere."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):

@@ -35,7 +35,7 @@ def exit_code(work: Callable[[], object], *, own: bool = True) -> int:
     # pydantic would search all installed packages for plugins of its own
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
-        with workers.reused():
+        with workers.keep_workers():
             code = work()
             return code if isinstance(code, int) else 0
     except FlexclearError as error:

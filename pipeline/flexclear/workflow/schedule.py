@@ -103,7 +103,7 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
         _fail_wrong(plan)
         for task in plan.waiting:
             if store.last(task.folder, task.label) is not None:
-                store.outdated(task.folder, task.label, UNFINISHED)
+                store.mark_outdated(task.folder, task.label, UNFINISHED)
         monitor.start(len(plan.waiting))
         width = min(jobs or cores.cores(), _width(plan.waiting))
         with stopping.gently(monitor.say):
@@ -114,7 +114,7 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
         monitor.end()
         for task in plan.tasks:
             if task in plan.failed:
-                store.outdated(task.folder, task.label, plan.failed[task].message)
+                store.mark_outdated(task.folder, task.label, plan.failed[task].message)
     failures = tuple(dict.fromkeys(plan.failed.values()))
     if any(failure.exit_code == INTERRUPTED for failure in failures):
         for failure in failures:
@@ -159,7 +159,7 @@ def _fail_wrong(plan: _Plan) -> None:
 def _run_here(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
     """Run the tasks one after the other in this process."""
     while ready := plan.ready():
-        why = stopping.requested()
+        why = stopping.stop_reason()
         if why:
             _leave_waiting(plan, why)
             return
@@ -175,12 +175,12 @@ def _run_here(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> 
 def _run_in_workers(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
     """Run the tasks in worker processes."""
     running: dict[Future[Record | Failure], _Running] = {}
-    with workers.team(width) as team, stopping.heeded():
-        while (plan.waiting or running) and not stopping.requested():
+    with workers.team(width) as team, stopping.heed_requests():
+        while (plan.waiting or running) and not stopping.stop_reason():
             _submit(plan, running, team.pool, width, store, sources, monitor)
             _collect(plan, running, monitor)
             _relay(team.channel, monitor)
-        if stopping.requested():
+        if stopping.stop_reason():
             _end_in_good_order(plan, running, team.channel, monitor)
 
 
@@ -190,7 +190,7 @@ def _end_in_good_order(
     """Ask the workers to stop, and wait up to GRACE for their partial results, without those that cannot leave any."""
     from concurrent.futures import wait
 
-    why, end = stopping.requested(), time.monotonic() + GRACE
+    why, end = stopping.stop_reason(), time.monotonic() + GRACE
     channel.request_stop(why)
     while time.monotonic() < end:
         _, late = wait(running, timeout=TICK)
@@ -264,7 +264,7 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
         try:
             result = future.result()
         except BrokenProcessPool:
-            if stopping.requested():  # Ctrl-C ends a worker that has just started and does not ignore it yet
+            if stopping.stop_reason():  # Ctrl-C ends a worker that has just started and does not ignore it yet
                 plan.waiting.append(task)
                 continue
             raise ResourceError(f"{task.scene} {task.label}: {workers.LOST}") from None
@@ -274,7 +274,7 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
 
 
 def _relay(channel: workers.Channel, monitor: Monitor) -> None:
-    for news in channel.received():
+    for news in channel.take_reports():
         monitor.update(*news)
 
 

@@ -34,14 +34,14 @@ def request(why: str) -> None:
     _why = _why or why
 
 
-def requested() -> str:
+def stop_reason() -> str:
     """Return the reason why the work must stop; empty while it may go on."""
     return _why or next((why for due, why in _conditions if due()), "")
 
 
 def check() -> None:
     """Raise StoppedError when the work must stop."""
-    why = requested()
+    why = stop_reason()
     if why:
         raise error(why)
 
@@ -57,7 +57,7 @@ def heeds() -> bool:
 
 
 @contextmanager
-def heeded() -> Iterator[None]:
+def heed_requests() -> Iterator[None]:
     """Declare that the work inside this context checks for requests."""
     global _heeded
     with _heeded_lock:  # several threads of a task may integrate at the same time

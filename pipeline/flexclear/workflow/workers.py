@@ -67,7 +67,7 @@ class Channel:
         with self.unstoppable.get_lock():
             self.unstoppable.value += 1
 
-    def received(self) -> list[Any]:
+    def take_reports(self) -> list[Any]:
         """Return, in the parent, the reports of workers since the last call."""
         news = []
         while not self.reports.empty():
@@ -168,7 +168,7 @@ _reusing = 0
 
 
 @contextmanager
-def reused() -> Iterator[None]:
+def keep_workers() -> Iterator[None]:
     """Keep workers alive between calls of `team` inside this context: starting and importing take a second.
 
     Workers have the environment of their start, so a context is for one command.
@@ -192,9 +192,9 @@ def team(width: int) -> Iterator[Team]:
         # a team for reuse may serve a wider call later; workers that are never needed are never started
         current = _idle.pop() if _idle else _team(max(width, cores.cores()) if _reusing else width)
         stack.callback(kill, current.pool)
-        current.channel.received()  # discards reports of the last call
+        current.channel.take_reports()  # discards reports of the last call
         yield current
-        if not stopping.requested():
+        if not stopping.stop_reason():
             stack.pop_all()
             if _reusing:
                 _idle.append(current)

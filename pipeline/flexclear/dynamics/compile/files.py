@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flexclear.artifacts.disk import checked, locked, publish, read_checked
+from flexclear.artifacts.disk import encode_with_digest, hold_lock, publish, read_checked
 from flexclear.dynamics.compile import machine_code
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.specialise.tape import UnsuitedError
@@ -118,7 +118,7 @@ def _digests(path: Path) -> dict[str, str]:
 
 def file_lock(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
     """Return a context: True when this process has the lock next to a file, which ends with it; wait: for another's."""
-    return locked(path.with_suffix(".lock"), wait=wait)
+    return hold_lock(path.with_suffix(".lock"), wait=wait)
 
 
 def compiles(compiler: Callable[[Callable], Any]) -> Callable[[Callable], int]:
@@ -161,7 +161,7 @@ def _compile(path: Path) -> None:
         if not INTERPRETED:
             made = loaded[path.stem]
             publish(path.with_suffix(CODE), made.image or machine_code.image(made.keeper))
-            publish(path.with_suffix(".sum"), checked(_digests(path)))
+            publish(path.with_suffix(".sum"), encode_with_digest(_digests(path)))
     except BaseException:  # interrupted, or disk full: the code is incomplete
         loaded.pop(path.stem, None)
         raise

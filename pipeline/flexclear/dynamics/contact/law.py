@@ -62,7 +62,7 @@ class Hysteresis:
 
     def resolve(self, law: Hysteretic, stiffness: float, mass: float | None) -> Resolved:
         """Return the law for the scene's numbers; raise ValueError, in words, when it cannot deliver them."""
-        parameter = delivered = float(law.requested or 0.0)  # its keys demand one
+        parameter = delivered = float(law.given_restitution or 0.0)  # its keys demand one
         if law.restitution is None:
             a = closed_form.factor(delivered)
             parameter = self._parameter(law.law, a)

@@ -15,7 +15,7 @@ import numpy as np
 
 from flexclear.artifacts.coordinates import motion
 from flexclear.artifacts.labelled import LabelledArray, LabelledArrays
-from flexclear.artifacts.schema import RUN, conformed
+from flexclear.artifacts.schema import RUN, conform_arrays
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record.dataset import attributes, recorded, subject
@@ -113,7 +113,7 @@ def join_phases(scene: Scene, phases: Sequence[Phase], notes: Sequence[str]) -> 
     facts = attributes(scene) | _facts(parts, notes)
     facts["events"] = "\n".join(_sentence(one, loss) for one, loss in _events(phases))
     schema = RUN | {name: replace(RUN[name], gaps=True) for name in gaps}
-    return conformed(whole, schema, title=f"Motion of {subject(scene)}", **facts)
+    return conform_arrays(whole, schema, title=f"Motion of {subject(scene)}", **facts)
 
 
 def _events(phases: Sequence[Phase]) -> list[tuple[Happened, float]]:

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flexclear.artifacts.effect_size import Influence, influence, recorded, same_starts
+from flexclear.artifacts.effect_size import Influence, compared_values, influence, same_starts
 from flexclear.artifacts.labelled import Labelled
 from flexclear.artifacts.points import Point
 from flexclear.dynamics.model.mechanism import build
@@ -173,7 +173,7 @@ class ScreeningRuns:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
             place = names, level, scene.solver.integrator
-            runner = Runner(own, recorded(scene.owners(), self.chosen), starts, engine=self._engines.get(place))
+            runner = Runner(own, compared_values(scene.owners(), self.chosen), starts, engine=self._engines.get(place))
             measured = self.points[key] = runner.run(scene)
             self._engines[place] = runner.engine
             self.evaluations += measured.evaluations

@@ -30,7 +30,7 @@ from flexclear.scene.load import edited
 from flexclear.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.scene.quantity import KINDS, OF_CLEARANCE, Quantity, parse
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, uncoupled, without_parts
+from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, uncoupled_paths, without_parts
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress, silent
 
@@ -67,7 +67,7 @@ def plan(
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
-    uncoupled_parts = uncoupled(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
+    uncoupled_parts = uncoupled_paths(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
     plain = edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
     bare = without_parts(plain, uncoupled_parts)
     own, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))

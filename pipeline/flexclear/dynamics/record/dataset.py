@@ -10,8 +10,8 @@ import numpy as np
 
 from flexclear.artifacts import quantities
 from flexclear.artifacts.coordinates import motion
-from flexclear.artifacts.labelled import LabelledArrays, labelled
-from flexclear.artifacts.schema import RUN, conformed
+from flexclear.artifacts.labelled import LabelledArrays, label_arrays
+from flexclear.artifacts.schema import RUN, conform_arrays
 from flexclear.dynamics.effects.citations import references
 from flexclear.dynamics.equations.observation import Observed, Series, Variables
 from flexclear.dynamics.model.driving import prescribed_coordinates
@@ -53,7 +53,7 @@ def recorded(run: Run) -> LabelledArrays:
         variables |= part[0]
         coordinates |= part[1]
     title, facts = f"Motion of {subject(run.scene)}", attributes(run.scene) | _report(run)
-    return conformed(labelled(variables, coordinates), RUN, title=title, **facts)
+    return conform_arrays(label_arrays(variables, coordinates), RUN, title=title, **facts)
 
 
 def variables_for(
@@ -73,7 +73,9 @@ def variables_for(
     parts += [made() for makes, made in _makers(scene, motions) if any(name.startswith(makes) for name in requested)]
     parts.append(({"time": (("time",), time)}, {}))
     variables = {name: values for part in parts for name, values in part[0].items() if name in requested}
-    return labelled(variables | (events or {}), {name: values for part in parts for name, values in part[1].items()})
+    return label_arrays(
+        variables | (events or {}), {name: values for part in parts for name, values in part[1].items()}
+    )
 
 
 def series(scene: Scene, motions: Motions, requested: Collection[Quantity], time: np.ndarray) -> dict[str, np.ndarray]:

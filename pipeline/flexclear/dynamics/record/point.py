@@ -11,7 +11,7 @@ import numpy as np
 
 from flexclear.artifacts import quantities
 from flexclear.artifacts.points import Point, Values
-from flexclear.artifacts.quantities import SAME_TIME, of_impacts, reduced, regular_times
+from flexclear.artifacts.quantities import SAME_TIME, of_impacts, reduce_series, regular_times
 from flexclear.dynamics.model.checks import section_period
 from flexclear.dynamics.model.contacts import arms
 from flexclear.dynamics.record.dataset import events_of, series, variables_for
@@ -212,7 +212,7 @@ def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regul
 
 def _reduce_series(one: Recorded, time: np.ndarray, over_time: np.ndarray, regular: np.ndarray) -> np.ndarray:
     """Return the recorded value of a series, shape (time, ...); regular: rows of the regular output times."""
-    value = over_time[regular] if one.reduction == "series" else reduced(time, over_time, one.reduction)
+    value = over_time[regular] if one.reduction == "series" else reduce_series(time, over_time, one.reduction)
     return np.asarray(value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0])
 
 

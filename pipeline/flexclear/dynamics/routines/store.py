@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flexclear.artifacts.disk import checked, disk_limits, publish, read_checked
+from flexclear.artifacts.disk import disk_limits, encode_with_digest, publish, read_checked
 from flexclear.artifacts.paths import kernel_root
 from flexclear.dynamics.compile import functions
 from flexclear.dynamics.compile.folder import writable
@@ -81,7 +81,7 @@ def stored(topology: bytes, build: Callable[[], CallList], report: Callable[[str
             calls = build()
             loaded[path] = load(calls, report)
             with disk_limits(path.parent):
-                publish(path, checked(_table(calls)))
+                publish(path, encode_with_digest(_table(calls)))
     return loaded[path]
 
 

@@ -183,9 +183,9 @@ class RunInParts:
         """Return the trajectory up to a time [s] or later, or until a request to stop."""
         self._until = time
         while not self._reached or self._reached[0][0].control[m.TIME] < min(time, self._reached[0][0].end):
-            with stopping.heeded():
+            with stopping.heed_requests():
                 self._reached[:] = [next(self._parts)]
-            if stopping.requested():
+            if stopping.stop_reason():
                 break
         return self._reached[0]
 
@@ -200,8 +200,8 @@ class RunInParts:
         engine = last if over else another(last)  # observation would disturb an engine that goes on
         shown = trajectory if self._pair is None else trajectory.without(self._pair.added)
         run = Run(self._scene, engine, shown, observe_run(engine, shown), None, switched, self._mended)
-        if not over and stopping.requested():
-            return replace(run, stopped=stopping.requested())
+        if not over and stopping.stop_reason():
+            return replace(run, stopped=stopping.stop_reason())
         require_shallow(run.model, run.trajectory, run.observed)
         require_closed(run.model, *run.judged)
         return run
@@ -243,7 +243,7 @@ def follow(
     outputs: np.ndarray | None = None,
 ) -> Followed:
     """Return the trajectory to the end or until `stop`; arguments and the other results as of `follow_in_parts`."""
-    with stopping.heeded():
+    with stopping.heed_requests():
         return next(follow_in_parts(engine, y, progress, other, judges, stop, outputs))
 
 

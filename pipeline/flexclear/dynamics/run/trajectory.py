@@ -53,7 +53,7 @@ def never(rows: np.ndarray) -> bool:
 
 def stop_requested(rows: np.ndarray) -> bool:
     """Return True on a request to stop: the run ends with its rows so far."""
-    return bool(stopping.requested())
+    return bool(stopping.stop_reason())
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def integrate(
     jumps: Jumps | None = None,
 ) -> Trajectory:
     """Integrate from a consistent start, to the end or until `stop`; arguments and errors as of `in_parts`."""
-    with stopping.heeded():
+    with stopping.heed_requests():
         return next(in_parts(engine, y, progress, stop, left, outputs, judge, jumps))
 
 

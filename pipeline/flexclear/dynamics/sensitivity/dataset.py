@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from flexclear.artifacts.labelled import Labelled
-from flexclear.artifacts.quantities import IMPACT, reduced
+from flexclear.artifacts.quantities import IMPACT, reduce_series
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.merge import find_frame
 from flexclear.dynamics.model.model import Model
@@ -162,7 +162,7 @@ def _derivative(
         return np.asarray(value if at <= horizon else np.nan)
     # step for the derivative of reductions, smooth functions of their series, as a fraction of the largest change
     step = 1e-6 * (np.abs(series).max(initial=0.0) or 1.0) / (np.abs(change).max(initial=0.0) or 1.0)
-    ends = [reduced(time, series + sign * step * change, recorded.reduction) for sign in (-1.0, 1.0)]
+    ends = [reduce_series(time, series + sign * step * change, recorded.reduction) for sign in (-1.0, 1.0)]
     result = np.asarray((ends[1] - ends[0]) / (2.0 * step))
     result = result if time[-1] <= horizon else np.full_like(result, np.nan)
     return result if result.ndim == 0 or one.quantity.dim else result[..., 0]

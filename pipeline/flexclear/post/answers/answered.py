@@ -18,7 +18,7 @@ class Answered(xr.Dataset):
         return f"{getattr(self, '_answer', '')}{super()._repr_html_()}"
 
 
-def answered(data: xr.Dataset, text: str, picture: bytes | None = None, table: str = "") -> Answered:
+def with_answer(data: xr.Dataset, text: str, picture: bytes | None = None, table: str = "") -> Answered:
     """Return the dataset with an answer: text, a picture as PNG, a table as HTML."""
     result = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
     image = "" if picture is None else small_picture(picture)

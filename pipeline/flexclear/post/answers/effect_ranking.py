@@ -29,7 +29,7 @@ from flexclear.post.answers.effect_sizes import (
     MEANING_NOT_COMPARABLE,
     NOT_COMPARABLE,
     cell,
-    listed,
+    join_names,
     with_early_changes,
     written,
 )
@@ -61,23 +61,23 @@ class Pair:
     members: int
 
 
-def compared(pair: Pair, quantity: Quantity) -> Influence:
+def influence_of(pair: Pair, quantity: Quantity) -> Influence:
     """Return the change by the effect; nan where a run was refused."""
     return change(pair.without, pair.full, quantity, pair.members)
 
 
-def decided(change: Influence, scale: float) -> bool:
+def is_decided(change: Influence, scale: float) -> bool:
     """Return True when further ensemble members cannot change the verdict on a change."""
     if not np.isfinite(change.difference) or change.uncertainty == 0.0:
         return True
     return change.real or change.most <= SLIGHT * scale
 
 
-def undecided(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
+def undecided_quantities(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
     """Return the quantities whose verdict beyond the horizon further members may change."""
     if pair.full.refused or pair.without.refused:
         return []
-    return [q for q in chosen if not decided(compared(pair, q), size(pair.full, q))]
+    return [q for q in chosen if not is_decided(influence_of(pair, q), size(pair.full, q))]
 
 
 def assemble(
@@ -96,7 +96,7 @@ def assemble(
     time integration of a run in a quantity up to a time [s].
     """
     names = list(pairs)
-    changes = [[compared(pairs[name], q) for q in chosen] for name in names]
+    changes = [[influence_of(pairs[name], q) for q in chosen] for name in names]
     begun = [early_changes(p.without, p.full, chosen, p.members, times, error) for p in pairs.values()]
     full = next(iter(pairs.values())).full
     scales = [size(full, q) if not full.refused else np.nan for q in chosen]
@@ -106,7 +106,7 @@ def assemble(
     data = {
         "dropped": (dims, differences, {"long_name": "change without the effect"}),
         "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be due to chance"}),
-        "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
+        "decided": (dims, np.array([[is_decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
         "scatter": (
             ("quantity",),
@@ -169,20 +169,20 @@ def in_words(
     if not change.difference:
         value = in_unit(change.uncertainty, unit, 2)
     amount = f"{up_to} <b class='n'>{value}</b>{part}"
-    if not decided(change, scale) and spread > SLIGHT * scale:
+    if not is_decided(change, scale) and spread > SLIGHT * scale:
         apart = f"<b class='n'>{in_unit(spread, unit, 2)}</b>{part and percent(spread)}"
         return (
             f"is not predictable: {members} runs from slightly different starts differ by {apart} (standard deviation);"
             f" their mean differs from the ideal mechanism {amount}; "
-            f"about {round_up(needed(change, scale, members))} runs would decide"
+            f"about {round_up(members_to_decide(change, scale, members))} runs would decide"
         )
-    if not decided(change, scale) and members:
-        means += f"; about {round_up(needed(change, scale, members))} runs would decide"
+    if not is_decided(change, scale) and members:
+        means += f"; about {round_up(members_to_decide(change, scale, members))} runs would decide"
     slightly = "slightly, " if 0.0 < change.difference < SLIGHT * scale else ""
     return f"changes {slightly}{amount}{means}"
 
 
-def needed(change: Influence, scale: float, members: int) -> int:
+def members_to_decide(change: Influence, scale: float, members: int) -> int:
     """Estimate the members that decide a change: chance falls with the root of their number, and by Student's t."""
     enough, fewer = max(SLIGHT * scale, change.difference / REAL), chance(MANY) / chance(members)
     return int(np.ceil(members * (fewer * change.uncertainty / enough) ** 2)) if enough > 0.0 else 2 * members
@@ -209,16 +209,16 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
         certain, possible = _called_for(single, limits)
         added = [effect for effect in certain if effect not in named]
         uncertain = [effect for effect in possible if effect not in certain]
-        open_ = f" (undecided{beyond}: {listed(uncertain)})" if uncertain else ""
+        open_ = f" (undecided{beyond}: {join_names(uncertain)})" if uncertain else ""
         if added:
-            sentences.append(f"For {name}, {'also ' if named else ''}model {listed(added)}{open_}.")
+            sentences.append(f"For {name}, {'also ' if named else ''}model {join_names(added)}{open_}.")
         elif uncertain:
             sentences.append(f"For {name}, no {'further ' if named else ''}effect is certain to be needed{open_}.")
         else:
             unchanged.append(name)
         named += added
     if unchanged:
-        sentences.append(f"For {listed(unchanged)}, no {'further ' if named else ''}effect is needed.")
+        sentences.append(f"For {join_names(unchanged)}, no {'further ' if named else ''}effect is needed.")
     sentences += [_parts(single, reached)] if reached.size else []
     sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + last)
@@ -232,17 +232,17 @@ def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
         for row in zip(single["early"].values, single["early_uncertainty"].values, strict=True)
     ]
     scales = single["size"].values
-    left = [w for w, row in zip(words, changes, strict=True) if not all(map(decided, row, scales))]
+    left = [w for w, row in zip(words, changes, strict=True) if not all(map(is_decided, row, scales))]
     beyond = [w for w, sure in zip(words, single["decided"].values, strict=True) if not sure.all()]
     members = int(single["members"].max())
     until = " to ".join(dict.fromkeys(in_unit(time, "s") for time in (reached.min(), reached.max())))
     more = [enough for enough, _ in (_deciding(single, i) for i in range(len(words))) if enough]
-    said = f"undecided for {listed(left)}" if left else "decided for each effect"
+    said = f"undecided for {join_names(left)}" if left else "decided for each effect"
     text = f"Up to the horizon, t = {until}, all runs of a variant are one motion, and its change is {said}"
     if not beyond:
         return f"{text}; means of {members} runs decide it over the whole run as well."
     return (
-        f"{text}; over the whole run means of {members} runs leave it open for {listed(beyond)}, "
+        f"{text}; over the whole run means of {members} runs leave it open for {join_names(beyond)}, "
         f"which some {' to '.join(dict.fromkeys(map(str, (min(more), max(more)))))} runs would decide."
     )
 
@@ -268,7 +268,7 @@ def _deciding(result: xr.Dataset, i: int) -> tuple[int, str]:
         (Influence(float(result["dropped"][i, k]), float(result["dropped_uncertainty"][i, k])), float(scale))
         for k, scale in enumerate(result["size"].values)
     ]
-    more = [needed(change, scale, members) for change, scale in changes if not decided(change, scale)]
+    more = [members_to_decide(change, scale, members) for change, scale in changes if not is_decided(change, scale)]
     enough = round_up(max(more)) if more else 0
     return enough, f"{members}; some {enough} would decide" if more else str(members)
 

@@ -44,11 +44,11 @@ def variants(effects: Sequence[Effect]) -> list[Names]:
     """Return the necessary variants, each once: full, bare, and each effect and pair removed and added."""
     every = frozenset(effect.name for effect in effects)
     chosen = [frozenset(pair) for n in (0, 1, 2) for pair in combinations(every, n)]
-    sets = [closed(effects, gone) for few in chosen for gone in (few, every - closed_up(effects, few))]
+    sets = [with_dependents(effects, gone) for few in chosen for gone in (few, every - closed_up(effects, few))]
     return list(dict.fromkeys(sorted(sets, key=lambda names: (len(names), sorted(names)))))
 
 
-def closed(effects: Sequence[Effect], gone: Names) -> Names:
+def with_dependents(effects: Sequence[Effect], gone: Names) -> Names:
     """Return the removed effects with those that exist only within them."""
     return gone | {effect.name for effect in effects if effect.within in gone}
 
@@ -83,7 +83,7 @@ def assemble(
             pair = frozenset({one.name, other.name})
             # an effect within another one is added on top of that one
             ground = every - (closed_up(effects, pair) - pair)
-            bare, lost = points.get(ground, UNKNOWN), points[closed(effects, pair)]
+            bare, lost = points.get(ground, UNKNOWN), points[with_dependents(effects, pair)]
             gained = points[every - closed_up(effects, pair)]
             single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
             independent = i != j and one.within != other.name and other.within != one.name
@@ -211,7 +211,7 @@ def written(value: float, uncertainty: float, unit: str) -> str:
     return format_with_error(value, uncertainty, unit) if uncertainty > 0.0 else in_unit(value, unit, 3)
 
 
-def listed(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """Return names with commas and a final `and`."""
     return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
@@ -223,7 +223,7 @@ def stay(names: Sequence[str]) -> str:
     places = " ".join(f"joint.{name}" for name in names)
     verb = "stays" if len(names) == 1 else "stay"
     return (
-        f"{listed(names)} {verb} in every variant, as a ball on a plane has no ideal counterpart "
+        f"{join_names(names)} {verb} in every variant, as a ball on a plane has no ideal counterpart "
         f"(its own effect: flexclear effects --of {places})."
     )
 

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.artifacts.effect_size import Agreement
-from flexclear.post.answers.effect_sizes import listed, written
+from flexclear.post.answers.effect_sizes import join_names, written
 from flexclear.post.plotting.table import Table
 from flexclear.scene.output import Schema
 from flexclear.scene.output import table as described
@@ -117,11 +117,11 @@ def table(planned: xr.Dataset) -> Table:
     notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
     if decided["uncoupled"]:
         notes.append(
-            f"Not integrated, since the requested quantities do not depend on it: {listed(decided['uncoupled'])}."
+            f"Not integrated, since the requested quantities do not depend on it: {join_names(decided['uncoupled'])}."
         )
     notes += _constant(decided)
     notes.append(
-        f"{_integrated(decided)} The plan is based on {planned.attrs['runs']} short runs, "
+        f"{_integration_sentence(decided)} The plan is based on {planned.attrs['runs']} short runs, "
         f"{planned.attrs['evaluations']:,} evaluations."
     )
     return Table(
@@ -138,10 +138,12 @@ def _constant(decided: Mapping[str, Any]) -> list[str]:
     if not names:
         return []
     verb = "never changes" if len(names) == 1 else "never change"
-    return [f"Left out: {listed(names)}, which {verb} in the ideal mechanism; [accuracy] takes an absolute accuracy."]
+    return [
+        f"Left out: {join_names(names)}, which {verb} in the ideal mechanism; [accuracy] takes an absolute accuracy."
+    ]
 
 
-def _integrated(decided: Mapping[str, Any]) -> str:
+def _integration_sentence(decided: Mapping[str, Any]) -> str:
     """Return a sentence on integrator and tolerance of the planned run."""
     if "integrator" not in decided:
         return "No other integrator or tolerance is cheaper and as accurate as requested: the scene's own is used."
@@ -163,7 +165,7 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
     )
     if not errors:
         return f"{head}; the effect on the requested quantities cannot be determined."
-    text = f"{head}, which change {listed(errors)}"
+    text = f"{head}, which change {join_names(errors)}"
     if called > given:
         return f"{text}: the requested accuracy requires {called}."
     return f"{text}: enough; {called} suffice. Elements cost no time in a run, so the recipe is unchanged."
@@ -171,16 +173,15 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
 
 def words(planned: xr.Dataset) -> str:
     """Return the plan in a sentence or two, for a designer."""
-    needed, unseen, gone = _sorted(planned)
+    needed, unseen, gone = _effects_by_decision(planned)
     keeps = f" {planned.attrs['staying']}" if planned.attrs.get("staying") else ""
     asked = " and ".join(str(name) for name in planned["quantity"].values)
     if not needed and not unseen:
-        return (
-            f"For the requested accuracy of {asked} the ideal mechanism suffices: {listed(gone)} may be omitted.{keeps}"
-        )
-    left = f"{listed(gone)} may be omitted" if gone else "nothing may be omitted" if not unseen else ""
-    parts = [f"{listed(needed)} must be modelled" if needed else "", left]
-    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} modelled unexamined" if unseen else ""]
+        without = join_names(gone)
+        return f"For the requested accuracy of {asked} the ideal mechanism suffices: {without} may be omitted.{keeps}"
+    left = f"{join_names(gone)} may be omitted" if gone else "nothing may be omitted" if not unseen else ""
+    parts = [f"{join_names(needed)} must be modelled" if needed else "", left]
+    parts += [f"{join_names(unseen)} {'is' if len(unseen) == 1 else 'are'} modelled unexamined" if unseen else ""]
     return f"For the requested accuracy of {asked}: {'; '.join(filter(None, parts))}.{keeps}"
 
 
@@ -191,10 +192,10 @@ def verdict(one: Agreement) -> str:
     """Return met where error plus chance is below the allowed error, missed where certainly above, else not decided."""
     if one.met:
         return MET if one.horizon == 1.0 else MET_TO_HORIZON
-    return MISSED if one.missed else UNDECIDED
+    return MISSED if one.is_missed else UNDECIDED
 
 
-def verified(planned: xr.Dataset) -> Table:
+def verification_table(planned: xr.Dataset) -> Table:
     """Tabulate the true distance of the planned run from the full one, next to the requested one."""
     rows = []
     for k, name in enumerate(planned["quantity"].values):
@@ -244,10 +245,10 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
             continue
         text = json.loads(result.attrs["planned"])
         constant |= dict.fromkeys([*_constant(text), *filter(None, [result.attrs.get("staying")])])
-        needed, unseen, gone = _sorted(result)
+        needed, unseen, gone = _effects_by_decision(result)
         modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
         method = f"{text['integrator']}, rtol {text['rtol']:.0e}" if "integrator" in text else "as the scene"
-        rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
+        rows.append((level, *(join_names(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
     return Table(
         "Effects that each accuracy requires",
         ("accuracy", "needed", "unexamined", "may be omitted", "modes", "integrated by"),
@@ -261,7 +262,7 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
     )
 
 
-def _sorted(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
+def _effects_by_decision(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
     """Return effects in words: those needed, those that stay without evidence, and those that may be left out."""
     rows = list(zip(result["words"].values, result["kept"].values, result["reason"].values, strict=True))
     return (

@@ -58,7 +58,7 @@ def checks(
     members: horizon of the scene's ensemble [s], or None.  by_need: True when the program chose the integrator.
     """
     agreement = [] if study is None else _agreement(study, _finer(run))
-    result = [_energy(run), *_loops(run), *agreement, _rejected(run), _stiff(run, by_need)]
+    result = [_energy(run), *_loops(run), *agreement, _rejected_steps(run), _stiff(run, by_need)]
     return [*result, *_condition(run), *_predictable(run, members)]
 
 
@@ -118,7 +118,7 @@ def _agreement(study: xr.Dataset, remedy: str) -> list[Check]:
     return result
 
 
-def _rejected(run: xr.Dataset) -> Check:
+def _rejected_steps(run: xr.Dataset) -> Check:
     steps, rejected = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
     fraction = rejected / max(steps + rejected, 1.0)
     remedy = "another integrator, or a tighter tolerance"

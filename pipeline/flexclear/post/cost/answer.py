@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.post.cost.study import methods, recording, resolved
+from flexclear.post.cost.study import is_resolved, methods, recording
 from flexclear.post.overview.curves import size_of
 from flexclear.post.plotting.table import Table
 
@@ -182,7 +182,7 @@ def _notes(study: xr.Dataset) -> list[str]:
         + ", ".join(str(q) for q in study["quantity"].values)
         + "; each as a fraction of its own size (of positions and angles the largest change from the start, of others "
         "the largest value), the reference's uncertainty included.",
-        _confirmed(study),
+        _confirmation_sentence(study),
     ]
     if recorded == recorded:
         notes.append(
@@ -191,7 +191,9 @@ def _notes(study: xr.Dataset) -> list[str]:
     missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
     if missing:
         notes.append(f"{' and '.join(missing)} {_absent(study)}: {_why_not(study)}.")
-    hidden = sum(int((~resolved(one, g) & np.isfinite(one[f"error_by_{g}"])).sum()) for g, _, _, one in methods(study))
+    hidden = sum(
+        int((~is_resolved(one, g) & np.isfinite(one[f"error_by_{g}"])).sum()) for g, _, _, one in methods(study)
+    )
     if hidden:
         notes.append(
             f"{hidden} errors are less than 10 times the reference's own uncertainty and are not drawn; "
@@ -204,7 +206,7 @@ def _notes(study: xr.Dataset) -> list[str]:
     return notes
 
 
-def _confirmed(study: xr.Dataset) -> str:
+def _confirmation_sentence(study: xr.Dataset) -> str:
     uncertain, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
     reference = f"Reference: {study.attrs['reference']}. "
     if not by:

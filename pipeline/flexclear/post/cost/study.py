@@ -89,7 +89,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     reference = runs[next(p.key for p in points if p.group == "reference")]
     if "refused" in reference.attrs:
         raise SolverError(
-            f"no comparison: the reference ({_described(points, 'reference')}) is refused: {reference.attrs['refused']}"
+            f"no comparison: the reference ({_keys_of(points, 'reference')}) is refused: {reference.attrs['refused']}"
         )
     until = comparable_until(points, runs)
     scales = {q: quantities.scale(reference, q) for q in chosen}
@@ -122,8 +122,8 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     if asis is not None and "refused" not in asis.attrs:
         data["own_error"] = (("quantity",), errors(asis) + np.nan_to_num(floor))
     attributes = {
-        "reference": _described(points, "reference"),
-        "confirmation": _described(points, "confirmation"),
+        "reference": _keys_of(points, "reference"),
+        "confirmation": _keys_of(points, "confirmation"),
         "horizon": until if np.isfinite(until) else "none",
         "end": float(reference["time"].values[-1]),
         "refused": "; ".join(f"{p.key}: {_reason(runs[p.key])}" for p in points if "refused" in runs[p.key].attrs),
@@ -145,7 +145,7 @@ def methods(study: xr.Dataset) -> Iterator[tuple[str, str, str, xr.Dataset]]:
             yield group, str(name), setting, study.sel({method: name})
 
 
-def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
+def is_resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Return True where the reference can measure an error; same shape as ``error_by_<group>``."""
     return study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
 
@@ -211,5 +211,5 @@ def relative(error: float, scale: float) -> float:
     return error / scale if scale > 0.0 else error
 
 
-def _described(points: Sequence[Point], group: str) -> str:
+def _keys_of(points: Sequence[Point], group: str) -> str:
     return "; ".join(p.key for p in points if p.group == group)

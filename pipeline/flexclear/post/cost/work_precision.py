@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flexclear.post.cost.study import MARGIN, methods, recording, resolved
+from flexclear.post.cost.study import MARGIN, is_resolved, methods, recording
 from flexclear.post.plotting.style import GRID, INK, SOFT, files, heading, panels, scale_of, set_plain_numbers, style
 from flexclear.scene.integrators import INTEGRATORS
 
@@ -66,7 +66,9 @@ def make(
 def curves(study: xr.Dataset) -> list[Curve]:
     """Return the curves of all integrators of a study, those with a tolerance and those with a step."""
     return [
-        Curve(name, one[f"cpu_seconds_by_{group}"].values, one[f"error_by_{group}"].values, resolved(one, group).values)
+        Curve(
+            name, one[f"cpu_seconds_by_{group}"].values, one[f"error_by_{group}"].values, is_resolved(one, group).values
+        )
         for group, name, _, one in methods(study)
     ]
 

@@ -191,13 +191,13 @@ def in_folder(page: bytes) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     suffix = {kind: name for name, kind in TYPES.items()}
 
-    def extracted(match: re.Match[str]) -> str:
+    def move_to_file(match: re.Match[str]) -> str:
         content = base64.b64decode(match[2])
         name = f"files/{len(files) + 1:03d}.{suffix[match[1]]}"
         files[name] = content
         return f"src='{name}'"
 
-    text = re.sub(r"src='data:((?:image|video)/[\w+.-]+);base64,([A-Za-z0-9+/=]+)'", extracted, page.decode())
+    text = re.sub(r"src='data:((?:image|video)/[\w+.-]+);base64,([A-Za-z0-9+/=]+)'", move_to_file, page.decode())
     return {"index.html": text.encode(), **files}
 
 

@@ -114,7 +114,9 @@ class Layout:
             return Site(owner, offset * axes[:, 2], self.frames.index(frame))
         return Site(owner, origin - self.centre(frame.partition(".")[0]) + offset * axes[:, 2])
 
-    def seated(self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
+    def part_at_frame(
+        self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0
+    ) -> Part:
         """Return a part at a frame, given in the frame's axes."""
         site, axes = self.site(frame), self.local(frame)[1]
         return Part(site.owner, surfaces.place(part, site.origin, axes), color, opacity, site.frame, contact)

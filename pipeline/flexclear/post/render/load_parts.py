@@ -47,8 +47,8 @@ def _bushing(at: Layout, load: Mapping[str, Any], size: float) -> Iterator[Part]
     axis = min((2, 0, 1), key=lambda k: abs(along[(k + 1) % 3] - along[(k + 2) % 3]))
     turn, pin = surfaces.along(np.eye(3)[axis]), PIN * size
     ring = forms.ring(1.05 * pin, 2.8 * pin, 3.0 * pin)
-    yield at.seated(first, surfaces.place(ring, np.zeros(3), turn), LOAD_COLOR)
-    yield at.seated(second, surfaces.place(surfaces.cylinder(pin, 4.2 * pin), np.zeros(3), turn), JOINT_COLOR)
+    yield at.part_at_frame(first, surfaces.place(ring, np.zeros(3), turn), LOAD_COLOR)
+    yield at.part_at_frame(second, surfaces.place(surfaces.cylinder(pin, 4.2 * pin), np.zeros(3), turn), JOINT_COLOR)
 
 
 def _spring_on_joint(at: Layout, load: Mapping[str, Any], size: float, bodies: Sequence[Part]) -> Iterator[Part]:
@@ -76,7 +76,7 @@ def _spring_on_joint(at: Layout, load: Mapping[str, Any], size: float, bodies: S
     elif load.get("stiffness"):
         radius, long = 2.2 * PIN * size, 3.0 * PIN * size
         coil = surfaces.place(forms.coil(radius, long, 0.2 * radius), np.array([0.0, 0.0, -0.5 * long]))
-        yield at.seated(second, coil, LOAD_COLOR)
+        yield at.part_at_frame(second, coil, LOAD_COLOR)
 
 
 def _spring_between(run: xr.Dataset, ends: tuple[Site, Site], load: Mapping[str, Any], radius: float) -> Iterator[Part]:

@@ -251,35 +251,37 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
         grounded = at.owner(first) is None
         if kind in forms.BALLS:
             radius = float(joint.get("ball_radius", BALL * size))
-            yield at.seated(second, surfaces.sphere(radius), color, contact)
+            yield at.part_at_frame(second, surfaces.sphere(radius), color, contact)
             if kind in SURFACES and not SURFACES[kind].hollow:
-                yield at.seated(first, _floor(at, joint, size), GROUND_COLOR)
+                yield at.part_at_frame(first, _floor(at, joint, size), GROUND_COLOR)
             else:
-                yield at.seated(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
+                yield at.part_at_frame(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
         elif "revolute" in kind or "slot" in kind:
             radius = float(joint.get("pin_radius", PIN * size))
             long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # the links would hide shorter ones
-            yield at.seated(second, surfaces.cylinder(radius, long), color, contact)
+            yield at.part_at_frame(second, surfaces.cylinder(radius, long), color, contact)
             if "slot" in kind:
                 half = 0.5 * joint.get("travel", 0.0)
                 low, high = (-half, half) if half else travel(at.run, name)
                 rim = surfaces.prism(surfaces.hull(np.array([[low, 0.0], [high, 0.0]]), SOCKET * radius), 0.5 * long)
-                yield at.seated(first, rim, SOCKET_COLOR, opacity=0.5)
+                yield at.part_at_frame(first, rim, SOCKET_COLOR, opacity=0.5)
             elif kind in SURFACES:
-                yield at.seated(first, surfaces.cylinder(SOCKET * radius, 0.8 * long), SOCKET_COLOR, opacity=0.35)
+                yield at.part_at_frame(
+                    first, surfaces.cylinder(SOCKET * radius, 0.8 * long), SOCKET_COLOR, opacity=0.35
+                )
             elif grounded:
-                yield at.seated(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
+                yield at.part_at_frame(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
         elif kind in forms.SLIDING:
             low, high = travel(at.run, name)
             rail = surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size)
             middle = np.array([0.0, 0.0, 0.5 * (low + high)])
-            yield at.seated(first, surfaces.place(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
+            yield at.part_at_frame(first, surfaces.place(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
         elif kind == "universal":
             for frame, axis in ((first, np.eye(3)[0]), (second, np.eye(3)[1])):
                 arm = surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size)
-                yield at.seated(frame, surfaces.place(arm, np.zeros(3), surfaces.along(axis)), color)
+                yield at.part_at_frame(frame, surfaces.place(arm, np.zeros(3), surfaces.along(axis)), color)
         elif kind == "planar":
-            yield at.seated(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
+            yield at.part_at_frame(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
 
 
 def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:

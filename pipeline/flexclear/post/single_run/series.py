@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.artifacts.labelled import LabelledArrays, labelled, of
+from flexclear.artifacts.labelled import LabelledArrays, label_arrays, of
 from flexclear.artifacts.quantities import IMPACT, PERTURBATION, SEPARATED, separated_from
-from flexclear.artifacts.schema import conformed, require_complete
+from flexclear.artifacts.schema import conform_arrays, require_complete
 from flexclear.numerics.rotations import angle_about_y, first_largest, rotation_between
 from flexclear.post.single_run.schema import POST
 
@@ -26,11 +26,11 @@ Arrays = dict[str, np.ndarray]
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
-    """Return `derived` for datasets."""
-    return derived(of(run), None if ensemble is None else of(ensemble)).to_xarray()
+    """Return `derive_arrays` for datasets."""
+    return derive_arrays(of(run), None if ensemble is None else of(ensemble)).to_xarray()
 
 
-def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> LabelledArrays:
+def derive_arrays(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> LabelledArrays:
     """Return the post artifact of one run (schema POST): rotations, displacements, reactions, impacts, horizon.
 
     run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one the artifact has no ensemble
@@ -61,7 +61,7 @@ def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> Labe
     attributes["references"] = str(run.attrs.get("references", ""))
     title = f"Derived results: {run.attrs['title']}"
     data = {name: (POST[name].dims, values) for name, values in arrays.items()}
-    return conformed(labelled(data, coords), POST, title=title, **attributes)
+    return conform_arrays(label_arrays(data, coords), POST, title=title, **attributes)
 
 
 def motion(run: xr.Dataset | LabelledArrays) -> Arrays:

@@ -60,7 +60,7 @@ def read(path: Path) -> Robot:
             str(path), "robots' files are read by MuJoCo, which is not installed", "pip install 'flexclear[robots]'"
         ) from None
     read_files: dict[Path, ElementTree.Element] = {}
-    root = _checked(path, path.parent, read_files)
+    root = _checked_root(path, path.parent, read_files)
     _require_ordinary(path, read_files.values())
     if root.tag not in ("mujoco", "robot"):
         problem = f"is neither a URDF nor an MJCF: its outermost element is <{root.tag}>, not <robot> or <mujoco>"
@@ -88,7 +88,7 @@ def read(path: Path) -> Robot:
     return robot
 
 
-def _checked(path: Path, folder: Path, seen: dict[Path, ElementTree.Element]) -> ElementTree.Element:
+def _checked_root(path: Path, folder: Path, seen: dict[Path, ElementTree.Element]) -> ElementTree.Element:
     """Return the root of a file after checks of it and of all that it includes; folder: of the outermost file."""
     require_file(path, str(path))
     if path.stat().st_size > LARGEST_FILE or len(seen) > MOST_FILES:
@@ -101,14 +101,14 @@ def _checked(path: Path, folder: Path, seen: dict[Path, ElementTree.Element]) ->
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError(str(path), f"is not complete XML: {error}", "export or copy it again") from None
     seen[path.resolve()] = root
-    for element, copies in _nested(root):
+    for element, copies in _elements_with_copies(root):
         _check(path, element, copies)
         if element.tag in ("include", "model") and (name := element.get("file")) is not None:
             inner = next((f for f in (folder / name, path.parent / name) if f.is_file()), None)
             if inner is None:
                 raise InputError(str(path), f'<{element.tag} file="{name}">: there is no such file', "put it there")
             if inner.resolve() not in seen:
-                _checked(inner, folder, seen)
+                _checked_root(inner, folder, seen)
     return root
 
 
@@ -122,7 +122,7 @@ def _require_ordinary(path: Path, roots: Iterable[ElementTree.Element]) -> None:
                 raise InputError(str(path), f"names {place}, which is not an ordinary file", "name a file")
 
 
-def _nested(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, float]]:
+def _elements_with_copies(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, float]]:
     """Yield all elements, each with the number of copies that the elements around it and itself ask for."""
     waiting = [(root, 1.0)]
     while waiting:

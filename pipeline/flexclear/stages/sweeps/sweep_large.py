@@ -16,7 +16,7 @@ from pathlib import Path
 import xarray as xr
 
 from flexclear.artifacts.disk import disk_limits
-from flexclear.artifacts.points import Point, dimensions, unpacked
+from flexclear.artifacts.points import Point, dimensions, unpack_points
 from flexclear.artifacts.store import Record, Store
 from flexclear.stages.sweeps.sweep_plan import Plan
 from flexclear.system import machine
@@ -91,7 +91,7 @@ def written(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> 
 
 def _slabs(plan: Plan, store: Store, done: Mapping[str, Point]) -> Iterator[xr.Dataset]:
     records_by_key = dict(_batch_records(plan, store))
-    opened = lru_cache(BATCHES)(lambda k: unpacked(store.load(records[k]), plan.recorded))
+    opened = lru_cache(BATCHES)(lambda k: unpack_points(store.load(records[k]), plan.recorded))
     records = {record.key: record for record in records_by_key.values()}
     complete = int(all(job.key in done for job in plan.jobs))
     count = plan.design.shape[0]
@@ -117,6 +117,6 @@ def write_copy(path: Path, dataset: xr.Dataset) -> None:
     write(path, (dataset.isel({along: slice(k, k + rows)}).load() for k in range(0, count, rows)), along)
 
 
-def stripped(point: Point) -> Point:
+def without_values(point: Point) -> Point:
     """Return a point without its values, which are in the store."""
     return Point({}, {}, {}, point.evaluations, point.refused)

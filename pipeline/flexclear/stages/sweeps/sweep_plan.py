@@ -70,7 +70,7 @@ class Family:
         """Return all points of the family in sound stored batches, with their values of the `recorded` quantities."""
         points_by_key: dict[str, Point] = {}
         for _, batch in self.batches(store):
-            points_by_key |= results.unpacked(batch, recorded)
+            points_by_key |= results.unpack_points(batch, recorded)
         return points_by_key
 
     def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
@@ -147,7 +147,7 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     try:
         base = edited(scene, {**sweep.set, "accuracy": None}) if sweep.set else edited(scene, {"accuracy": None})
     except InputError as error:
-        raise _placed(f"{where} [set]", error) from None
+        raise _error_at(f"{where} [set]", error) from None
     check_members(sweep.members or 0, base.limits, f"{where} [members]")
     sweep_design = design(sweep)
     _check_values(base, sweep_design, where)
@@ -156,13 +156,13 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
         simulation.check_parts(simulation.params(base))
     except InputError as error:
         raise lines.with_line_number(lines.with_file_name(error, base.path)) from None
-    recorded = tuple(_recorded(base, name, where) for name in sweep.keep)
+    recorded = tuple(_parse_kept_value(base, name, where) for name in sweep.keep)
     _check_recorded(sweep, base, sweep_design, recorded, where)
     _check_units(base, sweep_design, recorded, where)
     return Plan(sweep, base, sweep_design, recorded)
 
 
-def _placed(where: str, error: InputError) -> InputError:
+def _error_at(where: str, error: InputError) -> InputError:
     problem, remedy = getattr(error, "problem", str(error)), getattr(error, "remedy", None)
     return InputError(where, problem, remedy)
 
@@ -177,14 +177,14 @@ def _check_values(base: Scene, sweep_design: Design, where: str) -> None:
     try:
         edited(base, points[0])
     except InputError as error:
-        raise _placed(f"{where} [vary{_refused_parameter(base, sweep_design)}]", error) from None
+        raise _error_at(f"{where} [vary{_refused_parameter(base, sweep_design)}]", error) from None
     for axis in sweep_design.axes:
         for k in _checked_indices(axis):
             chosen = points[k] if not sweep_design.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
             try:
                 with_numbers(base, chosen)
             except InputError as error:
-                raise _placed(f"{where} [vary.{axis.name}]", error) from None
+                raise _error_at(f"{where} [vary.{axis.name}]", error) from None
 
 
 def _refused_parameter(base: Scene, sweep_design: Design) -> str:
@@ -205,7 +205,7 @@ def _checked_indices(axis: Axis) -> Sequence[int]:
     return by_size[0], by_size[-1]
 
 
-def _recorded(base: Scene, name: str, where: str) -> Recorded:
+def _parse_kept_value(base: Scene, name: str, where: str) -> Recorded:
     try:
         return parse_recorded(name, base.owners())
     except ValueError as error:
@@ -244,9 +244,9 @@ def _check_recorded(sweep: Sweep, base: Scene, sweep_design: Design, recorded: S
 
 def _check_units(base: Scene, sweep_design: Design, recorded: Sequence[Recorded], where: str) -> None:
     """Raise InputError for a quantity whose unit differs between points."""
-    for axis, scene in _worded(base, sweep_design):
+    for axis, scene in _scenes_with_text_values(base, sweep_design):
         for one in recorded:
-            if _recorded(scene, one.name, where).unit != one.unit:
+            if _parse_kept_value(scene, one.name, where).unit != one.unit:
                 raise InputError(
                     f"{where} [vary.{axis.name}]",
                     f"'{one.name}' is a force at some points and a torque at others",
@@ -254,7 +254,7 @@ def _check_units(base: Scene, sweep_design: Design, recorded: Sequence[Recorded]
                 )
 
 
-def _worded(base: Scene, sweep_design: Design) -> Iterator[tuple[Axis, Scene]]:
+def _scenes_with_text_values(base: Scene, sweep_design: Design) -> Iterator[tuple[Axis, Scene]]:
     """Yield the scene at a point for each value that is text, and so may name other parts."""
     points = sweep_design.points()
     for axis in sweep_design.axes:

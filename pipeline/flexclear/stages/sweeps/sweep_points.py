@@ -51,7 +51,7 @@ class Family:
 
 
 @lru_cache(maxsize=RUNNERS)
-def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
+def _open_family(key: str, packed: bytes) -> tuple[Scene, Runner]:
     """Return scene and runner of a family; cached, since the runner holds the compiled functions."""
     from flexclear.dynamics.record.point import Runner
 
@@ -80,7 +80,7 @@ def work(
         raise InputError("--scheduler", "a worker runs different sources of flexclear", "install the same version")
     cores.set_idle(others_idle)
     threadpool_limits(1)  # NumPy may have been loaded with more threads
-    scene, runner = _opened(key, packed)
+    scene, runner = _open_family(key, packed)
     begun = time.process_time()
     results = _together(runner, scene, points) if together else [_point(runner, scene, point) for point in points]
     return results, time.process_time() - begun

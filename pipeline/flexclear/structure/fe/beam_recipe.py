@@ -77,7 +77,7 @@ class SegmentedBeam(Part):
     """segments in their order along the rod"""
 
     @model_validator(mode="after")
-    def _covered(self) -> SegmentedBeam:
+    def _check_coverage(self) -> SegmentedBeam:
         close = SAME_PLACE * self.length
         ends = [("the rod", 0.0, 0.0), *((f"segment {k}", s.start, s.end) for k, s in enumerate(self.segments))]
         ends.append(("the rod's end", self.length, self.length))

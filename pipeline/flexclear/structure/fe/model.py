@@ -96,7 +96,7 @@ class Drawn:
     motion: sp.csr_array
     outline: np.ndarray | None = None
 
-    def moved(self, vectors: np.ndarray) -> np.ndarray:
+    def nodal_motion(self, vectors: np.ndarray) -> np.ndarray:
         """Return the motion of the nodes along DIRECTIONS, shape (nodes, 6, n), for vectors of shape (ndof, n)."""
         shapes: np.ndarray = (self.motion @ vectors).reshape(-1, 6, vectors.shape[1])
         return shapes

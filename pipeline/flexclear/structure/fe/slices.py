@@ -53,7 +53,7 @@ class Slices:
 def integrate(body: Slices, vectors: np.ndarray) -> Integrals:
     """Return all invariants for vectors of shape (ndof, n); exact but for rounding."""
     m, X, D = body.mass, body.position.T, body.spread
-    s, theta = _moved(body, vectors)
+    s, theta = _motion_of_slices(body, vectors)
     mode_mode = _mode_mode(m, s)
     position_mode = np.einsum("p,kp,lpj->klj", m, X, s)
     # principal directions of each slice: three weighted motions, instead of nine products of axes
@@ -70,7 +70,7 @@ def integrate(body: Slices, vectors: np.ndarray) -> Integrals:
         position_mode_moment=position_mode,
         mode_mode_moment=mode_mode,
         second_order_moment=section_rotation(body, vectors)[:3],
-        untilted_inertia=_untilted(body),
+        untilted_inertia=_inertia_without_tilt(body),
     )
 
 
@@ -81,7 +81,7 @@ def section_rotation(body: Slices, vectors: np.ndarray, axis: np.ndarray | None 
     by theta; r: from the point that the section turns about.  vectors: shape (ndof, n).  axis: of the rod, where
     sections twist about their tilted axis, which adds :math:`\tfrac12\theta_1\,(\theta\times e)\times r`.
     """
-    _, theta = _moved(body, vectors)
+    _, theta = _motion_of_slices(body, vectors)
     first = body.mass[:, None] * body.offset
     arms = np.concatenate([body.spread + body.position[:, :, None] * first[:, None], first[:, None]], axis=1)
     along = np.einsum("lpi,pkm,mpj->klij", theta, arms, theta, optimize=True)
@@ -94,13 +94,13 @@ def section_rotation(body: Slices, vectors: np.ndarray, axis: np.ndarray | None 
     return result
 
 
-def _moved(body: Slices, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _motion_of_slices(body: Slices, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return displacements of the centres of mass and rotation vectors of the slices, shape (3, p, n) each."""
     moved = (body.motion @ vectors).reshape(len(body.mass), 6, vectors.shape[1]).transpose(1, 0, 2)
     return np.ascontiguousarray(moved[:3]), np.ascontiguousarray(moved[3:])
 
 
-def _untilted(body: Slices) -> np.ndarray:
+def _inertia_without_tilt(body: Slices) -> np.ndarray:
     """Return the inertia of the sections that twist but do not tilt [kg m^2], shape (3, 3)."""
     formal = body.rigid_spread[np.any(body.rigid_spread != body.spread, axis=(1, 2))].sum(axis=0)
     inertia: np.ndarray = np.trace(formal) * np.eye(3) - formal

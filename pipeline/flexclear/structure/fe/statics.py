@@ -42,11 +42,11 @@ class Flexibility:
         result[self.free] = self.factor.solve(loads[self.free])
         return result
 
-    def balanced(self, loads: np.ndarray) -> np.ndarray:
+    def balance_loads(self, loads: np.ndarray) -> np.ndarray:
         """Return P^T f: the loads with the inertia forces of the rigid motion that they cause."""
         return loads - self.momentum @ np.linalg.solve(self.inertia, self.model.rigid.T @ loads)
 
-    def relieved(self, shapes: np.ndarray) -> np.ndarray:
+    def remove_momentum(self, shapes: np.ndarray) -> np.ndarray:
         """Return P u: shapes without momentum."""
         return shapes - self.model.rigid @ np.linalg.solve(self.inertia, self.momentum.T @ shapes)
 

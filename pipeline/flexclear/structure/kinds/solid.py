@@ -25,7 +25,7 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     _, extent, axes = np.linalg.svd(X, full_matrices=False)
     if extent[1] > SLENDER * extent[0]:
         return ["elastic"] * vectors.shape[1]
-    u = model.drawn.moved(vectors)[:, :3]
+    u = model.drawn.nodal_motion(vectors)[:, :3]
     axis = axes[0]
     across = X - np.outer(X @ axis, axis)
     size = np.linalg.norm(across, axis=1, keepdims=True)
@@ -54,7 +54,7 @@ def _second_order(
     if not stiffening:
         pairs = np.stack(np.triu_indices(3), axis=1)
         nodal = np.stack([0.5 * (nodal[:, k, l] + nodal[:, l, k]) for k, l in pairs], axis=1)
-        work = forms_of(*_relieved(flexibility, spread, line, nodal, spread.T @ nodal))
+        work = forms_of(*_free_body_response(flexibility, spread, line, nodal, spread.T @ nodal))
         moment = np.empty((3, 3, n, n))
         for (k, l), form in zip(pairs, work, strict=True):
             moment[k, l] = moment[l, k] = -form
@@ -63,7 +63,7 @@ def _second_order(
     nodal = np.hstack([nodal.reshape(len(nodal), 12), np.zeros((len(nodal), of_frames.shape[1]))])
     loads = np.hstack([spread.T @ nodal[:, :12], of_frames])
     if held is None:
-        response, nodal = _relieved(flexibility, spread, line, nodal, loads)
+        response, nodal = _free_body_response(flexibility, spread, line, nodal, loads)
     else:
         response = border(flexibility, held.motion).solve(loads)
     forms = -forms_of(response, nodal)
@@ -71,14 +71,14 @@ def _second_order(
     return SecondOrder(moments[:3], moments[3], at_frames[:, 0], at_frames[:, 1])
 
 
-def _relieved(
+def _free_body_response(
     flexibility: Flexibility, spread: sp.csr_array, line: sp.csr_array, nodal: np.ndarray, loads: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return response (ndof, m) and nodal loads (3 nodes, m) of a free body, with its inertia forces."""
     acceleration = np.linalg.solve(flexibility.inertia, flexibility.model.rigid.T @ loads)
     moved = spread @ (flexibility.model.rigid @ acceleration)
     inertia = (line @ moved.reshape(line.shape[0], -1)).reshape(moved.shape)
-    return flexibility.response(flexibility.balanced(loads)), nodal - inertia
+    return flexibility.response(flexibility.balance_loads(loads)), nodal - inertia
 
 
 KIND = Kind(build=meshes.build, vtu=meshes.as_vtu, assemble=assemble, words=_words, second_order=_second_order)

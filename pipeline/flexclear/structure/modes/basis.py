@@ -74,7 +74,7 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
         none = Normal(np.empty(0), np.empty((body.model.size, 0)), np.empty(0))
         modes = body.normal(min(count + MARGIN, free)) if count else none
         count = whole(modes.values, count, static.shape[1])
-        return _joined(body, static, modes, count), modes.rigid_frequency
+        return _static_and_normal_shapes(body, static, modes, count), modes.rigid_frequency
     tried = FIRST
     while True:
         modes = body.normal(min(tried, free))
@@ -84,7 +84,7 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
         # the last cluster may continue beyond the computed modes
         for stop in ends if tried >= free else ends[:-1]:
             if _enough(body, static, modes, stop, requested):
-                return _joined(body, static, modes, stop), modes.rigid_frequency
+                return _static_and_normal_shapes(body, static, modes, stop), modes.rigid_frequency
         if tried >= free:
             raise _unreachable(body, static, modes, requested)
         tried *= 2
@@ -143,12 +143,12 @@ def _static(body: Body) -> np.ndarray:
     if condition.loaded.shape[0]:
         body.progress(None, "static shapes")
         flexibility = body.flexibility()
-        loads = flexibility.balanced(condition.loaded.T.toarray())
-        return flexibility.relieved(flexibility.response(loads))
+        loads = flexibility.balance_loads(condition.loaded.T.toarray())
+        return flexibility.remove_momentum(flexibility.response(loads))
     return np.empty((body.model.size, 0))
 
 
-def _joined(body: Body, static: np.ndarray, modes: Normal, count: int) -> np.ndarray:
+def _static_and_normal_shapes(body: Body, static: np.ndarray, modes: Normal, count: int) -> np.ndarray:
     shapes = modes.shapes[:, :count]
     if body.condition.residual and static.size:
         # response of the retained modes to a load: phi phi^T f / omega^2, with f = K u
@@ -171,7 +171,7 @@ def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, requested
     if requested.up_to is not None:
         following = modes.values[count : count + 1]
         return bool(following.size == 0 or eigen.frequency(following)[0] > requested.up_to)
-    vectors = _joined(body, static, modes, count)
+    vectors = _static_and_normal_shapes(body, static, modes, count)
     if requested.compliance is not None:
         return deficits.least(body.flexibility(), body.interfaces, vectors)[0] >= requested.compliance
     return requested.mass is not None and _mass_fraction(body.model, vectors) >= requested.mass
@@ -186,7 +186,7 @@ def _mass_fraction(model: Model, vectors: np.ndarray) -> float:
 
 
 def _unreachable(body: Body, static: np.ndarray, modes: Normal, requested: ModeRequest) -> InputError:
-    vectors = _joined(body, static, modes, len(modes.values))
+    vectors = _static_and_normal_shapes(body, static, modes, len(modes.values))
     if requested.compliance is not None:
         fraction, where = deficits.least(body.flexibility(), body.interfaces, vectors)
         problem = f"with every mode of this reference condition the basis has {fraction:.3g} of the compliance {where}"

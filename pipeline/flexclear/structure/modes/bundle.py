@@ -28,7 +28,7 @@ def build(
     kind = of_mesh(mesh)
     model = kind.assemble(mesh)
     vectors = modes["vector"].values
-    drawn = model.drawn.moved(vectors)
+    drawn = model.drawn.nodal_motion(vectors)
     integrals = model.integrate(vectors)
     held = next((frame for frame in model.interfaces if frame.name in modes.attrs["interfaces"].split()[:1]), None)
     second = kind.second_order(mesh, model, vectors, stiffening, held)

@@ -32,7 +32,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from flexclear.artifacts.compliance import fractions, reduced
+from flexclear.artifacts.compliance import fractions, frame_compliance
 from flexclear.structure.fe.model import DIRECTIONS, Interface, Model
 from flexclear.structure.fe.statics import Flexibility
 from flexclear.structure.modes import eigen, normal
@@ -83,12 +83,12 @@ def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, fir
         square = (2.0 * np.pi * value) ** 2
         if square == 0.0:
             # at rest an unbalanced load has no equilibrium; the inertia of the free body balances it
-            residual = flexibility.balanced(loads)
+            residual = flexibility.balance_loads(loads)
             residual = residual - K[:, 6:] @ _solve(vectors.T @ K[:, 6:], vectors.T @ residual)
         else:
             inner = basis.T @ (K - square * M)
             residual = loads - (K - square * M) @ _solve(inner, basis.T @ loads)
-        energy = np.einsum("ij,ij->j", residual, flexibility.response(flexibility.balanced(residual)))
+        energy = np.einsum("ij,ij->j", residual, flexibility.response(flexibility.balance_loads(residual)))
         result[:, k] = energy / (1.0 - (value / first) ** 2)
     # rounding may give negative values where a basis misses nothing
     return np.maximum(result, 0.0).reshape(len(model.interfaces), 6, len(hertz))
@@ -105,7 +105,7 @@ def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progre
     count = min(vectors.shape[1], COMPARED, model.size - 6)
     none = sp.csr_array((0, model.size))
     full = eigen.frequency(normal.lowest(model, none, count, lambda: flexibility, progress, rough=True).values)
-    shapes = flexibility.relieved(vectors)
+    shapes = flexibility.remove_momentum(vectors)
     values, _ = eigen.rediagonalise(model.stiffness, model.mass, shapes)
     resolved = np.abs(eigen.frequency(values)[:count] / full - 1.0) <= RESOLVED
     whole = count if resolved.all() else int(np.argmin(resolved))
@@ -155,7 +155,7 @@ def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vector
     scale = 1.0 / np.sqrt(np.diag(K))
     inner = scale[:, None] * (0.5 * (K + K.T)) * scale
     motion = (functionals @ (vectors * scale)).reshape(len(interfaces), 6, -1)
-    return reduced(motion, rigid, relief * scale, inner)
+    return frame_compliance(motion, rigid, relief * scale, inner)
 
 
 def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:

@@ -50,8 +50,8 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
         f"matrices: symmetric to {mesh.attrs['asymmetry']:.1g}, both positive definite but for six rigid motions, "
         f"which strain to {strain(model.stiffness, model.rigid).max():.1g} of the largest term",
         f"mass {mass:.7g} kg" + (f" ({stated:.7g} kg in the program's file)" if np.isfinite(stated) else ""),
-        f"centre of mass {_listed(centre)} m",
-        f"inertia about it, xx yy zz yz xz xy {_listed(six)} kg m^2",
+        f"centre of mass {_number_list(centre)} m",
+        f"inertia about it, xx yy zz yz xz xy {_number_list(six)} kg m^2",
     )
     return data, {"imported": "\n".join(lines)}
 
@@ -97,6 +97,6 @@ def _require_same(what: str, found: float, stated: float, unit: str) -> None:
         raise InputError(WHERE, problem, "check `units`, and that all files are of one model")
 
 
-def _listed(values: np.ndarray) -> str:
+def _number_list(values: np.ndarray) -> str:
     rounding = 1e-12 * np.abs(values).max()
     return " ".join(f"{value if abs(value) > rounding else 0.0:.6g}" for value in values)

@@ -89,7 +89,7 @@ def _sparse_modes(
     else:
 
         def inverse(loads: np.ndarray) -> np.ndarray:
-            return flexibility.relieved(flexibility.response(flexibility.balanced(loads)))
+            return flexibility.remove_momentum(flexibility.response(flexibility.balance_loads(loads)))
 
     def compliance(loads: np.ndarray) -> np.ndarray:
         progress(None, f"{count} normal modes of {model.size} coordinates")

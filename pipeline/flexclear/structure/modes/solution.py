@@ -111,7 +111,7 @@ def _frame(model: Model, name: str) -> Interface:
 def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[str, Any]:
     return {
         "frequency": (("mode",), eigen.frequency(values)),
-        "shape": (("node", "dof", "mode"), model.drawn.moved(vectors)),
+        "shape": (("node", "dof", "mode"), model.drawn.nodal_motion(vectors)),
         "vector": (("unknown", "mode"), vectors),
         "node_position": (("node", "axis"), model.drawn.position),
         "cell_node": (("cell", "corner"), model.drawn.cell),

@@ -120,7 +120,7 @@ def _inertia(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array) -> np.
 def _missing_response(model: Model, vectors: np.ndarray, omega: np.ndarray, loads: np.ndarray) -> np.ndarray:
     """Return the part of the response to each balanced load that the shapes lack, up to rigid motion, (ndof, loads)."""
     flexibility = support(model, lambda _: None)
-    balanced = flexibility.balanced(loads)
+    balanced = flexibility.balance_loads(loads)
     return flexibility.response(balanced) - vectors @ ((vectors.T @ balanced) / omega[:, None] ** 2)
 
 

@@ -26,9 +26,9 @@ def resolve(law: KelvinVoigt, stiffness: float, mass: float | None) -> Resolved:
     critical = None if mass is None else 2.0 * math.sqrt(stiffness * mass)
     if law.damping is not None:
         damping = law.damping
-    elif critical is None or law.requested is None:
+    elif critical is None or law.given_restitution is None:
         raise ValueError("no mass is known on either side of this joint; give an effective_mass, or a damping [N s/m]")
     else:
-        damping = critical * restitution.damping_ratio(law.requested)
+        damping = critical * restitution.damping_ratio(law.given_restitution)
     delivered = None if critical is None else restitution.linear_delivered(damping / critical)
-    return Resolved("linear-damper", Numbers(stiffness, 1.0, damping), law.requested, delivered)
+    return Resolved("linear-damper", Numbers(stiffness, 1.0, damping), law.given_restitution, delivered)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.artifacts.quantities import combined
+from flexclear.artifacts.quantities import evaluate_postfix
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.driving import coordinate_of, label, prescribed_coordinates
 from flexclear.dynamics.run.evaluation.engine import Engine
@@ -112,7 +112,7 @@ def _repeats(steps: list[Any], start: float, period: float, changes: Mapping[str
     sums = (["+"] * (len(step.of) - 1) if isinstance(step, Lookup) else [step] for step in steps)
     steps = [step for some in sums for step in some]
     with np.errstate(all="ignore"):  # powers of negative numbers
-        both = [combined(steps, partial(read, later=later)) for later in (0.0, 1.0)]
+        both = [evaluate_postfix(steps, partial(read, later=later)) for later in (0.0, 1.0)]
         now, then = (np.broadcast_to(v, (len(times), v.shape[1])).reshape(MOTIONS, TIMES, -1) for v in both)
         size = np.fmax.reduce(np.abs(now), axis=1, keepdims=True)
         return not bool(np.any(np.abs(then - now) > EQUAL * size))

@@ -229,10 +229,11 @@ def by_default(
 ) -> xr.Dataset:
     """Return the run of a scene that requests no accuracy and leaves its integration open.
 
-    As `deliver`, for BY_DEFAULT of each usual quantity over time (`Scene.requested`), up to the predictability horizon.
+    As `deliver`, for BY_DEFAULT of each usual quantity over time (`Scene.requested_quantities`), up to the
+    predictability horizon.
     """
     progress(None, f"running to an accuracy of {BY_DEFAULT:g} of the range of each quantity instead")
-    names = [q.name for q in scene.requested() if q.over_time]
+    names = [q.name for q in scene.requested_quantities() if q.over_time]
     request = {"quantities": {name: {"relative": BY_DEFAULT} for name in names}, "allow_missed": True, "by_need": True}
     wanting = edited(scene, {"accuracy": request})
     return _delivered(Search(wanting, make, costs(wanting), predictable=True), progress)

@@ -178,7 +178,7 @@ def read_npz(path: Path, where: str) -> Contents:
     """Read a file that `write_npz` wrote, or its arrays in HDF5; raise InputError when an array is missing."""
     require_file(path, where)
     with reading(path, where, f"'{path.name}' holds no matrices", "write it with exchange.files"):
-        data = _unpacked(path, where)
+        data = _read_arrays(path, where)
         content = Table(
             _array(data, "node", "iu"), _array(data, "component", "iu"), _array(data, "position", "iuf", (None, 3))
         )
@@ -196,7 +196,7 @@ def read_npz(path: Path, where: str) -> Contents:
     return Contents(matrices[0], matrices[1], content, data)
 
 
-def _unpacked(path: Path, where: str) -> dict[str, np.ndarray]:
+def _read_arrays(path: Path, where: str) -> dict[str, np.ndarray]:
     """Return all arrays of an npz or HDF5 file by name; refuse pickled objects, which could run code."""
     if path.suffix.lower() in HDF5:
         require_whole(path, where)

@@ -70,7 +70,7 @@ def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
         data["given_shape"] = (("unknown", "shape"), per_unit[:, None] * contents.basis)
     if recipe.shape.listing is not None:
         _, unit, time = SYSTEMS[recipe.shape.units]
-        frequency, total = programs.listed(folder / recipe.shape.listing, where)
+        frequency, total = programs.read_listing(folder / recipe.shape.listing, where)
         data["listed_frequency"] = (("listed",), frequency / time)
         data |= {} if total is None else {"listed_mass": ((), unit * total)}
     try:
@@ -242,7 +242,7 @@ def _integrate(mesh: xr.Dataset, M: sp.csr_array, component: np.ndarray) -> Call
         blocks = [(k, l, M[rows[k]][:, rows[l]]) for k in range(3) for l in range(3)]
         same = all(abs(block - line if k == l else block).max() <= alike for k, l, block in blocks)
     if not same:
-        rigid = _lumped(M, node, component, mesh["unknown_position"].values)
+        rigid = _as_slices(M, node, component, mesh["unknown_position"].values)
         if rigid is None:
             raise InputError(
                 WHERE,
@@ -313,7 +313,7 @@ def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:
     return Drawn(position, np.arange(count)[:, None], np.zeros(count), motion)
 
 
-def _lumped(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions: np.ndarray) -> Slices | None:
+def _as_slices(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions: np.ndarray) -> Slices | None:
     r"""Return the nodes as slices of mass, or None where the mass matrix is not that of rigid nodes.
 
     Most programs have every node of beams and shells as a small rigid body. A node's block of such a matrix, with the

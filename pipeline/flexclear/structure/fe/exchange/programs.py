@@ -248,7 +248,7 @@ def unknowns(path: Path, where: str) -> np.ndarray:
         return key(*pairs.reshape(-1, 2).T)
 
 
-def listed(path: Path, where: str) -> tuple[np.ndarray, float | None]:
+def read_listing(path: Path, where: str) -> tuple[np.ndarray, float | None]:
     """Return the frequencies per unit of time, and the mass, if any, that a listing states (`.dat`, `.f06`)."""
     require_file(path, where)
     frequency: list[float] = []

@@ -74,7 +74,7 @@ def start(gmsh: Any) -> None:
 
 
 @contextmanager
-def opened(path: Path, where: str) -> Iterator[Any]:
+def open_step(path: Path, where: str) -> Iterator[Any]:
     """Yield Gmsh with the solids of a STEP file; raise InputError, in words, without Gmsh or without any solid."""
     require_file(path, where)
     machine.require_memory(20.0 * path.stat().st_size, f"{where}: '{path.name}'", "export fewer parts")
@@ -103,7 +103,7 @@ def opened(path: Path, where: str) -> Iterator[Any]:
 def read(shape: StepFile, folder: Path, where: str) -> Geometry:
     """Mesh a solid of a STEP file; raise InputError for a file without it, ResourceError for too fine a mesh."""
     path = folder / shape.file
-    with opened(path, where) as gmsh:
+    with open_step(path, where) as gmsh:
         tags = [tag for _, tag in gmsh.model.getEntities(3)]
         if not 1 <= shape.solid <= len(tags):
             raise InputError(where, f"'{path.name}' has {len(tags)} solids, no solid {shape.solid}", "count from 1")
@@ -128,8 +128,8 @@ def read(shape: StepFile, folder: Path, where: str) -> Geometry:
 
 
 def solids(path: Path, where: str) -> list[Solid]:
-    """Return the solids of a STEP file in its order, as `opened` reads them."""
-    with opened(path, where) as gmsh:
+    """Return the solids of a STEP file in its order, as `open_step` reads them."""
+    with open_step(path, where) as gmsh:
         found = []
         for dim, tag in gmsh.model.getEntities(3):
             faces = [f for _, f in gmsh.model.getBoundary([(dim, tag)], oriented=False)]
@@ -140,7 +140,7 @@ def solids(path: Path, where: str) -> list[Solid]:
                     float(gmsh.model.occ.getMass(dim, tag)),
                     np.array(gmsh.model.occ.getCenterOfMass(dim, tag)),
                     np.array(gmsh.model.occ.getMatrixOfInertia(dim, tag)).reshape(3, 3),
-                    tuple(_merged(pieces)),
+                    tuple(_merge_cylinders(pieces)),
                 )
             )
     return found
@@ -167,7 +167,7 @@ def _piece(gmsh: Any, solid: int, face: int) -> tuple[Round, float]:
     return Round(inside > 4, inner, axis, radius, length), float(gmsh.model.occ.getMass(2, face))
 
 
-def _merged(pieces: list[tuple[Round, float]]) -> Iterator[Round]:
+def _merge_cylinders(pieces: list[tuple[Round, float]]) -> Iterator[Round]:
     """Yield each cylinder once, with the coaxial faces of its radius; those of less than `TURN` are left out."""
     rest = list(pieces)
     while rest:

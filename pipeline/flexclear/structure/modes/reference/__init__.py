@@ -12,7 +12,7 @@ CONDITIONS = {
     "fixed-fixed": held.fixed_fixed,
     "cantilever": held.cantilever,
     "pinned-pinned": held.pinned_pinned,
-    "constrained": held.constrained,
+    "constrained": held.hold_motions,
     "mean-axis": floating.mean_axis,
     "craig-bampton": held.craig_bampton,
     "given": held.given_shapes,

@@ -97,7 +97,7 @@ def pinned_pinned(model: Model, given: Given) -> Condition:
     return _held_condition(sp.csr_array(held), note)
 
 
-def constrained(model: Model, given: Given) -> Condition:
+def hold_motions(model: Model, given: Given) -> Condition:
     """Return the condition that holds motions ``frame.direction`` of `given.held`; raise InputError if unknown."""
     if not given.held:
         raise InputError("modes.held", "no motion is held", 'list at least six, as held = ["top.x", "top.rz", ...]')
