@@ -3,7 +3,9 @@
 The friction law 'modified-coulomb' is described in `dynamics.contact.friction.modified_coulomb`.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, Union, get_args
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, Union, get_args
 
 from pydantic import Field, create_model, model_validator
 
@@ -223,6 +225,37 @@ class Wear(Part):
     socket also into bands of equal area"""
 
 
+class Seat(NamedTuple):
+    """Place of a feature in the frame of its joint: origin [m], and its axes there, as rows of the rotation matrix."""
+
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+#: at the frame itself
+MIDDLE = Seat()
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two features of a joint that may touch, each at its seat in a frame of the joint.
+
+    contact: their surfaces and laws, with the attributes of a joint that is one contact.  swapped: the outer feature is
+    on the joint's second body.
+    """
+
+    contact: Any
+    outer: Seat = MIDDLE
+    inner: Seat = MIDDLE
+    swapped: bool = False
+
+    @property
+    def between(self) -> tuple[tuple[str, Seat], tuple[str, Seat]]:
+        """Frame of the joint and seat in it, of the outer and the inner feature."""
+        frames = self.contact.between[::-1] if self.swapped else self.contact.between
+        return (frames[0], self.outer), (frames[1], self.inner)
+
+
 class _Contact(Part):
     """Keys of all contacts between surfaces."""
 
@@ -275,6 +308,15 @@ class _Contact(Part):
     def shape(self) -> tuple[float, float]:
         """Further sizes that the kernels of the surfaces need."""
         return 0.0, 0.0
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """Pairs of features that may touch, by name; an empty name stands for the only pair."""
+        return {"": Pair(self)}
+
+    def begun(self, speeds: Mapping[str, float]) -> Self:
+        """Return the joint with initial approach speeds [m/s] of pairs that touch at the start, by name."""
+        return self.model_copy(update={"initial_approach_speed": speeds.get("", dict(speeds))})
 
 
 class _Clearance(_Contact):
@@ -369,7 +411,131 @@ class BallOnPlane(_Ball):
         return self.ball_radius
 
 
-Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane
+@dataclass(frozen=True)
+class Corner:
+    """Corner of one part of a sliding joint above a face of the other, with the attributes of a contact."""
+
+    joint: "ClearancePrismatic"
+    name: str
+    clearance: float
+
+    type: ClassVar[str] = "ball-on-plane"
+    hollow: ClassVar[bool] = False
+    shape: ClassVar[tuple[float, float]] = (0.0, 0.0)
+
+    def __getattr__(self, key: str) -> Any:
+        """Return what all corners of a joint have in common: laws, frames, materials, radius."""
+        return getattr(self.joint, key)
+
+    @property
+    def initial_approach_speed(self) -> float | None:
+        """Impact rate of the corner, if it touches at the start."""
+        given = self.joint.initial_approach_speed
+        return given.get(self.name) if isinstance(given, dict) else given
+
+
+class ClearancePrismatic(_Clearance):
+    """Rectangular slider in a guide with clearance; between = [guide frame, slider frame], each in the middle.
+
+    It slides along z of the guide's frame. Without `width` it also moves across its height, along x, and turns about y,
+    and the rest is held; with `width` and `side_clearance` nothing is held but by the contacts. Corners of the slider
+    meet the faces of the guide, which are longer than its travel; those of a shorter guide meet the slider's faces.
+    """
+
+    surfaces, ideal, plane = ("guide", "slider"), "prismatic", (0, 2)
+    type: Literal["clearance-prismatic"]
+    clearance: Annotated[Length, Positive]
+    """gap on either side of the slider across its height, when it is in the middle"""
+    length: Annotated[Length, Positive]
+    """length of the slider, along z"""
+    height: Annotated[Length, Positive]
+    """height of the slider, along x"""
+    width: Annotated[Length, Positive] | None = None
+    """width of the slider, along y, when it is loose in this direction as well"""
+    side_clearance: Annotated[Length, Positive] | None = None
+    """gap on either side of the slider across its width"""
+    guide_length: Annotated[Length, Positive] | None = None
+    """length of a guide that is shorter than the slider; default: longer than the slider's travel"""
+    corner_radius: Annotated[Length, Field(ge=0.0)] = 0.0
+    """radius of the corners; default: sharp ones, which need a normal.stiffness"""
+    initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | dict[str, Annotated[Speed, Field(ge=0.0)]] | None = None
+    """impact rate of the corners that touch at the start, which is refused otherwise, or a table of rates by corner; 0
+    for a resting slider"""
+    guide_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    slider_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Self:
+        if (self.width is None) != (self.side_clearance is None):
+            given, absent = ("width", "side_clearance") if self.width is not None else ("side_clearance", "width")
+            raise ValueError(
+                f"{given} is given and {absent} is not: a slider that is loose across its width, too, needs both, "
+                "a plane one neither"
+            )
+        if self.guide_length is not None and not self.guide_length < self.length:
+            raise ValueError(
+                f"guide_length = {self.guide_length:g} m is not below the slider's length, {self.length:g} m: it is of "
+                "a guide whose ends touch the slider's faces; leave it out where the slider's corners touch the guide"
+            )
+        if self.normal.stiffness is None and not self.corner_radius:
+            raise ValueError("the stiffness of sharp corners is unknown: give normal.stiffness, or corner_radius")
+        short = min(filter(None, (self.guide_length or self.length, self.height, self.width)))
+        if not 2.0 * self.corner_radius < short:
+            raise ValueError(
+                f"corner_radius = {self.corner_radius:g} m must be less than half the shortest side, {short:g} m"
+            )
+        unknown = [name for name in self._given_speeds() if name not in self.pairs]
+        if unknown:
+            raise ValueError(f"initial_approach_speed: there is no '{unknown[0]}'; known: {', '.join(self.pairs)}")
+        return self
+
+    def _given_speeds(self) -> dict[str, float]:
+        return self.initial_approach_speed if isinstance(self.initial_approach_speed, dict) else {}
+
+    @property
+    def held(self) -> str | None:  # type: ignore[override]
+        """The ideal joint that holds a slider in its plane."""
+        return "guided" if self.width is None else None
+
+    @property
+    def radius(self) -> float:
+        """Radius of the corners [m]."""
+        return self.corner_radius
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """Pairs of a corner and the face above it: ``corner_1`` to 4 or 8 across the height, ``side_1`` to 8."""
+        short, r = self.guide_length is not None, self.corner_radius
+        ends = 0.5 * (self.guide_length or self.length) - r
+        sizes = (0.5 * self.height, 0.5 * (self.width or 0.0), 0.5 * (self.guide_length or self.length))
+        gaps, made = (self.clearance, self.side_clearance or 0.0, 0.0), dict[str, Pair]()
+        # to the centre of a corner's sphere: of the slider's inwards from its faces, of the guide's outwards
+        inset = tuple(size + gap + r if short else size - r for size, gap in zip(sizes, gaps, strict=True))
+        loose = (0,) if self.width is None else (0, 1)
+        signs = [
+            (x, y, z) for x in (1.0, -1.0) for y in ((0.0,) if self.width is None else (1.0, -1.0)) for z in (1.0, -1.0)
+        ]
+        for axis, prefix in zip(loose, ("corner", "side"), strict=False):
+            for k, (x, y, z) in enumerate(signs, 1):
+                side, name = (x, y)[axis], f"{prefix}_{k}"
+                face = [0.0, 0.0, 0.0]
+                face[axis] = side * (sizes[axis] + (0.0 if short else gaps[axis]))
+                seats = Seat((face[0], face[1], face[2]), facing(axis, side if short else -side))
+                centre = Seat((x * inset[0], y * inset[1], z * ends))
+                made[name] = Pair(Corner(self, name, gaps[axis]), seats, centre, swapped=short)
+        return made
+
+
+def facing(axis: int, side: float) -> tuple[tuple[float, float, float], ...]:
+    """Return axes, as of a `Seat`, whose z is a frame's axis, or for a `side` of -1 points the other way."""
+    columns = ((axis + 1) % 3, side), ((axis + 2) % 3, 1.0), (axis, side)
+    x, y, z = ([value if k == row else 0.0 for k, value in columns] for row in range(3))
+    return (x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])
+
+
+Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | ClearancePrismatic | BallOnPlane
 #: all types of contacts
 CONTACTS: tuple[Any, ...] = get_args(Clearance)
 #: their classes by type

@@ -172,6 +172,8 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
         for pin in zip(table, model.contacts, model.laws, strict=True)
         if pin[1].name in replaceable_contacts(model.scene)
     ]
+    if not pins:
+        return y
     modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, _ in pins)
 
     def along(row: np.void, joint: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
