@@ -422,6 +422,7 @@ class Corner:
     type: ClassVar[str] = "ball-on-plane"
     hollow: ClassVar[bool] = False
     shape: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    across: ClassVar[tuple[int, ...]] = (2,)
 
     def __getattr__(self, key: str) -> Any:
         """Return what all corners of a joint have in common: laws, frames, materials, radius."""
@@ -503,6 +504,12 @@ class ClearancePrismatic(_Clearance):
     def radius(self) -> float:
         """Radius of the corners [m]."""
         return self.corner_radius
+
+    @property
+    def arms(self) -> tuple[float, float, float]:
+        """Distances of the corners that stop a turn about z, x and y of the guide [m]."""
+        long = self.guide_length or self.length
+        return self.width or self.height, long, long
 
     @property
     def pairs(self) -> dict[str, Pair]:

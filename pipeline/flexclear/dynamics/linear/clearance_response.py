@@ -43,7 +43,7 @@ from flexclear.dynamics.record.wrenches import (
 )
 from flexclear.dynamics.run.run import Run
 from flexclear.numerics.rotations import cross, rotation_vector_to_matrix, skew
-from flexclear.scene.clearance import Clearance
+from flexclear.scene.clearance import Clearance, ClearancePrismatic
 from flexclear.scene.parts import RigidBody
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene
@@ -83,7 +83,9 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Ma
                     bound[q.name] = np.inf
                 continue
             for name in loose:
-                reach = lever.clearance(name, adjoint) * _separation(full.contacts()[name], load[name])
+                reach = lever.clearance(name, adjoint, full.contacts()[name]) * _separation(
+                    full.contacts()[name], load[name]
+                )
                 clearance[name][q.name] = max(clearance[name][q.name], reach)
     return clearance
 
@@ -96,7 +98,8 @@ def knows_all_joints(model: Model) -> bool:
 
 def _separation(joint: Clearance, force: float) -> float:
     """Return how far the points may separate [m]: the clearance, and the penetration under a force."""
-    law = resolve_law(joint, 1.0, "[normal]")  # the depth at rest does not depend on the mass
+    first = next(iter(joint.pairs.values())).contact
+    law = resolve_law(first, 1.0, "[normal]")  # the depth at rest does not depend on the mass
     # assumed force on a joint with clearance after separation, as a multiple of the ideal force
     return joint.clearance + law.depth(10.0 * force)
 
@@ -124,11 +127,18 @@ class OpeningMap:
         rows = self.gradient @ dual
         return -rows.T, float(np.abs(watched - (self.gradient.T @ rows).T).max(initial=0.0))
 
-    def clearance(self, name: str, rows: np.ndarray) -> float:
+    def clearance(self, name: str, rows: np.ndarray, joint: Clearance) -> float:
         """Return the largest motion that an adjoint solution gives per metre of separation of a joint's points."""
         constraint, range_of_rows, _ = self.joints[name]
         count = {"revolute": 2, "slot": 1}.get(constraint.edge.kind, 3)
-        first = rows[:, range_of_rows][:, :count] / self.length
+        own = rows[:, range_of_rows]
+        if isinstance(joint, ClearancePrismatic):
+            # displacements along x and y, then turns about z, x and y; a slider that tilts is displaced that much less
+            arms = np.array([self.length, self.length, *(0.5 * size for size in joint.arms)])
+            x, y, about_z, about_x, about_y = np.linalg.norm(own[:, :5] / arms, axis=0)
+            wider = (joint.side_clearance or 0.0) / joint.clearance
+            return float(max(x, about_y, about_z if wider else 0.0) + wider * max(y, about_x))
+        first = own[:, :count] / self.length
         return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
 
 

@@ -34,7 +34,7 @@ SLENDER = 2.5
 LARGEST = 0.1
 #: joints that turn about z of their frames, and that slide along it
 TURNING = ("revolute", "slot", "planar", *(name for name, kind in SURFACES.items() if kind.held == "planar"))
-SLIDING = ("prismatic", "cylindrical")
+SLIDING = ("prismatic", "cylindrical", *(name for name, kind in SURFACES.items() if kind.ideal == "prismatic"))
 BALLS = ("spherical", *(name for name, kind in SURFACES.items() if kind.ideal == "spherical" or not kind.hollow))
 #: frames on a body at which a load acts, and at which nothing does
 LOADED, BARE = "load", "frame"

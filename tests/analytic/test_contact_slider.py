@@ -1,0 +1,215 @@
+"""Sliders that are loose in their guides: corners on faces, against closed forms and a second derivation."""
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from flexclear.numerics.rotations import quaternion_to_matrix
+from flexclear.scene.load import edited
+from flexclear.scene.schema import Scene
+from flexclear.scene.variants import effects, ideal
+from flexclear.system.errors import InputError
+from tests.analytic.mechanism_runs import impacts
+from tests.properties.mechanisms import LEAN, Table, frame, joint, matrix, rigid, scene, simulate, simulated, turned
+from tests.reference.sliders import final_state
+
+MASS, INERTIA = 0.5, [6e-4, 4e-4, 2e-4]
+LENGTH, HEIGHT, WIDTH, GAP, SIDE = 0.1, 0.04, 0.06, 1e-3, 0.8e-3
+STIFFNESS = 1e6
+LINEAR = {"law": "hertz", "exponent": 1.0, "stiffness": STIFFNESS}
+SLIDER: Table = {"clearance": GAP, "length": LENGTH, "height": HEIGHT, "normal": LINEAR}
+SPATIAL: Table = SLIDER | {"width": WIDTH, "side_clearance": SIDE}
+
+
+def sliding(
+    velocity: Any, omega: Any = (0.0, 0.0, 0.0), end: float = 0.01, *, short: bool = False, **more: Any
+) -> Table:
+    """A slider in the middle of a fixed guide, or where `short` a guide around a fixed slider; more: of the joint."""
+    moving = rigid(MASS, INERTIA, {"F": {}}, pose={}, velocity=list(velocity), angular_velocity=list(omega))
+    between = ("body.F", "ground.F") if short else ("ground.F", "body.F")
+    guide = joint("clearance-prismatic", *between) | SLIDER | more
+    return scene({"ground": {"type": "ground", "frames": {"F": {}}}, "body": moving}, {"guide": guide}, end)
+
+
+def springs(radius: float = 0.0, short: float | None = None, *, spatial: bool = False) -> list[Any]:
+    """Points of the moving body and planes that they meet, as the docstring of the joint describes them."""
+    sizes, gaps = np.array([HEIGHT, WIDTH if spatial else 0.0]) / 2.0, np.array([GAP, SIDE if spatial else 0.0])
+    centres = (
+        np.append(sizes + gaps + radius, short / 2.0 - radius) if short else np.append(sizes, LENGTH / 2.0) - radius
+    )
+    result = []
+    for x, y, z in product((1.0, -1.0), (1.0, -1.0) if spatial else (0.0,), (1.0, -1.0)):
+        for axis, side in enumerate((x, y) if spatial else (x,)):
+            normal = np.eye(3)[axis] * (side if short else -side)
+            plane = np.eye(3)[axis] * side * (sizes[axis] + (0.0 if short else gaps[axis]))
+            result.append((centres * [x, y, z], plane, normal))
+    return result
+
+
+def state(dataset: xr.Dataset) -> tuple[np.ndarray, ...]:
+    last = dataset.sel(body="body").isel(time=-1)
+    R = quaternion_to_matrix(last.quaternion.values)
+    return last.position.values, last.velocity.values, R, last.angular_velocity.values
+
+
+# One contact is several pairs ----------------------------------------------------------------------------------------
+def test_a_slider_that_hits_its_guide_flat_touches_it_with_two_corners_at_once() -> None:
+    """On two springs the contact lasts half a period of the mass on both, and throws it back as fast."""
+    speed, half = 0.5, np.pi * np.sqrt(MASS / (2.0 * STIFFNESS))
+    dataset = simulate(sliding([speed, 0.0, 2.0], end=0.009))
+    assert list(dataset.contact.values) == [f"guide.corner_{k}" for k in (1, 2, 3, 4)]
+    begin = GAP / speed
+    across = 2.0 * GAP / speed
+    for name in ("guide.corner_1", "guide.corner_2"):
+        found = impacts(dataset, contact=name)
+        # located to 1e-13 of the clearance, over the approach speed
+        assert found["start"] == pytest.approx([begin], abs=1e-11)
+        assert found["end"] == pytest.approx([begin + half], abs=1e-11)
+        assert found["approach"] == pytest.approx([speed], rel=1e-12)
+    for name in ("guide.corner_3", "guide.corner_4"):
+        assert impacts(dataset, contact=name)["start"] == pytest.approx([begin + half + across], abs=1e-11)
+    peak = speed * np.sqrt(MASS * STIFFNESS / 2.0)
+    tracked = dataset.event_peak_force.values[dataset.event_kind.values == "closing"][:2]
+    assert tracked == pytest.approx([peak] * 2, rel=1e-9)
+    # slides on without friction
+    assert dataset.position.sel(body="body").values[:, 2] == pytest.approx(2.0 * dataset.time.values, abs=1e-12)
+
+
+CASES: dict[str, tuple[Table, list[float], list[float], list[Any]]] = {
+    "sharp corners in a plane": (SLIDER, [0.3, 0.0, 1.0], [0.0, 5.0, 0.0], springs()),
+    "round corners in a plane": (SLIDER | {"corner_radius": 2e-3}, [0.3, 0.0, 1.0], [0.0, 5.0, 0.0], springs(2e-3)),
+    "short guide": (SLIDER | {"guide_length": 0.07}, [0.3, 0.0, 0.2], [0.0, 5.0, 0.0], springs(short=0.07)),
+    "short round guide": (
+        SLIDER | {"guide_length": 0.07, "corner_radius": 2e-3},
+        *([0.3, 0.0, 0.2], [0.0, 5.0, 0.0], springs(2e-3, 0.07)),
+    ),
+    "all directions": (SPATIAL, [0.3, 0.2, 1.0], [2.0, 5.0, 4.0], springs(spatial=True)),
+    "short guide, all directions": (
+        SPATIAL | {"guide_length": 0.07},
+        *([0.3, 0.2, 0.2], [2.0, 5.0, 4.0], springs(short=0.07, spatial=True)),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_corners_and_faces_push_as_in_a_second_derivation(case: str) -> None:
+    """After several impacts, tilted; the run and SciPy's are both good to about 1e-10 there."""
+    given, velocity, omega, points = CASES[case]
+    short = "guide_length" in given
+    dataset = simulate(sliding(velocity, omega, short=short, **given))
+    assert len(impacts(dataset)["start"]) >= 2
+    known = final_state(points, STIFFNESS, given.get("corner_radius", 0.0), MASS, INERTIA, velocity, omega, 0.01)
+    for found, exact in zip(state(dataset), known, strict=True):
+        assert found == pytest.approx(exact, abs=1e-7 * max(1.0, float(np.abs(exact).max())))
+    # the pairs' forces are summed at the joint, of which the second body is the moving one or the fixed one
+    force = dataset.joint_force.sel(joint="guide").values
+    known_force = MASS * dataset.acceleration.sel(body="body").values * (-1.0 if short else 1.0)
+    assert force == pytest.approx(known_force, abs=1e-9 * np.abs(known_force).max())
+    assert np.abs(dataset.energy_error.values).max() < 1e-8 * float(dataset.kinetic[0])
+
+
+def test_a_slider_rubs_with_all_corners_that_touch_and_the_books_close() -> None:
+    """Pressed flat by its weight it slides to rest by mu g, whatever number of corners shares the weight."""
+    rough = {"law": "ambrosio", "dynamic": 0.2, "v0": 0.0, "v1": 1e-3}
+    law = {"law": "flores", "restitution": 0.5, "stiffness": 1e8}
+    table = sliding([0.0, 0.0, 0.5], end=0.05, normal=law, friction=rough)
+    table["load"] = {"gravity": {"type": "gravity", "acceleration": [-9.81, 0.0, 0.0]}}
+    table["start"] = {"at": "equilibrium"}
+    dataset = simulate(table)
+    touching = dataset.contact_normal_force.values[0]
+    # at rest the two lower corners share the weight; moving, friction at their faces tilts it by mu height/length
+    assert touching == pytest.approx([0.0, 0.0, 0.5 * MASS * 9.81, 0.5 * MASS * 9.81], rel=1e-6)
+    assert dataset.velocity.sel(body="body").values[:, 2] == pytest.approx(
+        0.5 - 0.2 * 9.81 * dataset.time.values, abs=1e-4
+    )
+    pressed = dataset.contact_normal_force.values[-1]
+    assert pressed[2:].sum() == pytest.approx(MASS * 9.81, rel=1e-3)
+    assert (pressed[2] - pressed[3]) / pressed.sum() == pytest.approx(0.2 * HEIGHT / LENGTH, rel=1e-3)
+    lost = float(dataset.contact_friction_loss.values[-1].sum())
+    assert np.abs(dataset.energy_error.values).max() < 1e-8 * lost
+
+
+@pytest.mark.parametrize("short, at", [(False, 0.02), (False, 0.08), (True, 0.02), (True, 0.08)])
+def test_an_ideal_start_presses_the_corners_that_carry_force_and_moment(short: bool, at: float) -> None:
+    """A force at a distance from the middle: both corners of a side where it is between them, else one of each side."""
+    load, arm = 30.0, 0.5 * (0.07 if short else LENGTH)
+    table = sliding([0.0] * 3, end=1e-3, short=short, **({"guide_length": 0.07} if short else {}))
+    table["body"]["body"]["frames"]["P"] = {"position": [0.0, 0.0, at]}
+    table["load"] = {"push": {"type": "point-force", "frame": "body.P", "force": [-load, 0.0, 0.0]}}
+    table["start"] = {"at": "ideal"}
+    dataset = simulated(Scene.model_validate(table))
+    pushed = {(side, end): 0.5 * load * (1.0 + end * at / arm) for side, end in product((1, -1), (1, -1))}
+    # corners 1 to 4 are at x+ z+, x+ z-, x- z+, x- z-; the moving guide is pushed against the slider from above
+    lower, upper = ([0.0, 0.0, *(max(0.0, sign * pushed[-1, end]) for end in (1, -1))] for sign in (1.0, -1.0))
+    known = np.array(lower) + np.array([*upper[2:], 0.0, 0.0])
+    known = known[[2, 3, 0, 1]] if short else known
+    # pressed to 1e-9 of the clearance, and tilted by 1e-3 at most
+    assert dataset.contact_normal_force.values[0] == pytest.approx(known, abs=1e-4 * load)
+    assert dataset.contact_normal_force.values[-1] == pytest.approx(known, abs=1e-4 * load)
+
+
+def test_a_run_goes_on_with_the_corners_that_touch_at_an_event() -> None:
+    """Each with the rate at which it began, which a law with hysteresis needs: as without the event."""
+    table = sliding([0.3, 0.0, 1.0], [0.0, 5.0, 0.0], normal={"law": "flores", "restitution": 0.5, "stiffness": 1e6})
+    idle = {"type": "point-force", "frame": "body.F", "force": [0.0, 0.0, 0.0]}
+    whole = simulate(table)
+    begun = impacts(whole)
+    middle = float(0.5 * (begun["start"][0] + begun["end"][0]))
+    split = simulate(
+        table | {"load": {"idle": idle}, "event": {"cut": {"release": "load.idle", "at": f"{middle!r} s"}}}
+    )
+    for found, exact in zip(state(split), state(whole), strict=True):
+        assert found == pytest.approx(exact, abs=1e-9)
+
+
+# What else a scene can ask of it --------------------------------------------------------------------------------------
+def test_the_ideal_counterpart_is_a_prismatic_joint_along_the_same_axis() -> None:
+    loose = Scene.model_validate(sliding([0.0, 0.0, 2.0]))
+    assert [effect.name for effect in effects(loose)] == ["joint.guide.clearance"]
+    tight = ideal(loose)
+    assert tight.joint["guide"].type == "prismatic"
+    dataset = simulated(tight)
+    assert dataset.position.sel(body="body").values[:, 2] == pytest.approx(2.0 * dataset.time.values, abs=1e-12)
+
+
+def test_a_guide_may_be_turned_and_carried() -> None:
+    """The motion in the guide is the same in any pose of it."""
+    R, velocity, omega = matrix(LEAN), [0.3, 0.0, 1.0], [0.0, 5.0, 0.0]
+    table = sliding(velocity, omega)
+    table["body"]["ground"]["frames"]["F"] = frame((0.2, -0.1, 0.3), LEAN)
+    pose = {"position": [0.2, -0.1, 0.3], "rotation_vector": list(LEAN)}
+    table["body"]["body"] |= {"pose": pose, "velocity": turned(R, velocity), "angular_velocity": turned(R, omega)}
+    one, other = simulate(sliding(velocity, omega)), simulate(table)
+    moved = other.position.sel(body="body").values[-1] - [0.2, -0.1, 0.3]
+    assert R.T @ moved == pytest.approx(one.position.sel(body="body").values[-1], abs=1e-9)
+
+
+#: change of the joint, and what the refusal says
+REFUSED: dict[str, tuple[Table, str]] = {
+    "long guide": ({"guide_length": 0.2}, "the slider's corners touch the guide"),
+    "no gap": ({"clearance": 0.0}, "clearance"),
+    "half loose": ({"width": WIDTH}, "side_clearance"),
+    "sharp steel": ({"normal": {"law": "hertz"}, "guide_material": {"youngs_modulus": 2e11, "poisson": 0.3},
+                     "slider_material": {"youngs_modulus": 2e11, "poisson": 0.3}}, "corner_radius"),
+    "ball": ({"corner_radius": 0.03}, "less than half the shortest side"),
+    "unknown corner": ({"initial_approach_speed": {"corner_9": 0.1}}, "there is no 'corner_9'"),
+    "wear": ({"wear": {"coefficient": 1e-4, "hardness": 2e9}}, "wear"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_slider_that_cannot_be_is_refused_in_words(case: str) -> None:
+    changed, words = REFUSED[case]
+    with pytest.raises(ValueError, match=words):
+        Scene.model_validate(sliding([0.0] * 3, **changed))
+
+
+def test_a_slider_that_starts_in_the_guides_face_is_refused() -> None:
+    table = sliding([0.0] * 3)
+    table["body"]["body"]["pose"] = {"position": [1.5e-3, 0.0, 0.0]}
+    with pytest.raises(InputError, match="starts with a penetration of 500 um into the guide"):
+        simulate(table)
+    assert edited(Scene.model_validate(table), {"joint.guide.clearance": 2e-3}) is not None
