@@ -8,13 +8,13 @@ import pytest
 import xarray as xr
 
 from flexclear.numerics.rotations import quaternion_to_matrix
-from flexclear.scene.load import edited
+from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import effects, ideal
 from flexclear.system.errors import InputError
-from tests.analytic.mechanism_runs import impacts
+from tests.analytic.mechanism_runs import TREE, impacts
 from tests.properties.mechanisms import LEAN, Table, frame, joint, matrix, rigid, scene, simulate, simulated, turned
-from tests.reference.sliders import final_state
+from tests.reference.sliders import final_state, rigid_heights
 
 MASS, INERTIA = 0.5, [6e-4, 4e-4, 2e-4]
 LENGTH, HEIGHT, WIDTH, GAP, SIDE = 0.1, 0.04, 0.06, 1e-3, 0.8e-3
@@ -67,7 +67,7 @@ def test_a_slider_that_hits_its_guide_flat_touches_it_with_two_corners_at_once()
         found = impacts(dataset, contact=name)
         # located to 1e-13 of the clearance, over the approach speed
         assert found["start"] == pytest.approx([begin], abs=1e-11)
-        assert found["end"] == pytest.approx([begin + half], abs=1e-11)
+        assert found["start"] + found["duration"] == pytest.approx([begin + half], abs=1e-11)
         assert found["approach"] == pytest.approx([speed], rel=1e-12)
     for name in ("guide.corner_3", "guide.corner_4"):
         assert impacts(dataset, contact=name)["start"] == pytest.approx([begin + half + across], abs=1e-11)
@@ -114,7 +114,7 @@ def test_corners_and_faces_push_as_in_a_second_derivation(case: str) -> None:
 def test_a_slider_rubs_with_all_corners_that_touch_and_the_books_close() -> None:
     """Pressed flat by its weight it slides to rest by mu g, whatever number of corners shares the weight."""
     rough = {"law": "ambrosio", "dynamic": 0.2, "v0": 0.0, "v1": 1e-3}
-    law = {"law": "flores", "restitution": 0.5, "stiffness": 1e8}
+    law = {"law": "kelvin-voigt", "stiffness": 1e7, "damping": 1e3}
     table = sliding([0.0, 0.0, 0.5], end=0.05, normal=law, friction=rough)
     table["load"] = {"gravity": {"type": "gravity", "acceleration": [-9.81, 0.0, 0.0]}}
     table["start"] = {"at": "equilibrium"}
@@ -126,8 +126,9 @@ def test_a_slider_rubs_with_all_corners_that_touch_and_the_books_close() -> None
         0.5 - 0.2 * 9.81 * dataset.time.values, abs=1e-4
     )
     pressed = dataset.contact_normal_force.values[-1]
-    assert pressed[2:].sum() == pytest.approx(MASS * 9.81, rel=1e-3)
-    assert (pressed[2] - pressed[3]) / pressed.sum() == pytest.approx(0.2 * HEIGHT / LENGTH, rel=1e-3)
+    # vibrations from the beginning of friction have died out
+    assert pressed[2:].sum() == pytest.approx(MASS * 9.81, rel=1e-6)
+    assert (pressed[2] - pressed[3]) / pressed.sum() == pytest.approx(0.2 * HEIGHT / LENGTH, rel=1e-4)
     lost = float(dataset.contact_friction_loss.values[-1].sum())
     assert np.abs(dataset.energy_error.values).max() < 1e-8 * lost
 
@@ -146,23 +147,47 @@ def test_an_ideal_start_presses_the_corners_that_carry_force_and_moment(short: b
     lower, upper = ([0.0, 0.0, *(max(0.0, sign * pushed[-1, end]) for end in (1, -1))] for sign in (1.0, -1.0))
     known = np.array(lower) + np.array([*upper[2:], 0.0, 0.0])
     known = known[[2, 3, 0, 1]] if short else known
-    # pressed to 1e-9 of the clearance, and tilted by 1e-3 at most
-    assert dataset.contact_normal_force.values[0] == pytest.approx(known, abs=1e-4 * load)
-    assert dataset.contact_normal_force.values[-1] == pytest.approx(known, abs=1e-4 * load)
+    # pressed to 1e-9 of the clearance
+    assert dataset.contact_normal_force.values[0] == pytest.approx(known, abs=1e-6 * load)
+    # where the slider is jammed, its tilt of up to 2 clearance/length changes the lever arms by some hundredths
+    rest = 0.06 if at > arm else 1e-3
+    assert dataset.contact_normal_force.values[-1] == pytest.approx(known, abs=rest * load)
 
 
 def test_a_run_goes_on_with_the_corners_that_touch_at_an_event() -> None:
     """Each with the rate at which it began, which a law with hysteresis needs: as without the event."""
-    table = sliding([0.3, 0.0, 1.0], [0.0, 5.0, 0.0], normal={"law": "flores", "restitution": 0.5, "stiffness": 1e6})
+    table = sliding([0.3, 0.0, 1.0], [0.0, 5.0, 0.0], normal={"law": "flores", "restitution": 0.5, "stiffness": 1e8})
     idle = {"type": "point-force", "frame": "body.F", "force": [0.0, 0.0, 0.0]}
     whole = simulate(table)
     begun = impacts(whole)
-    middle = float(0.5 * (begun["start"][0] + begun["end"][0]))
+    middle = float(begun["start"][0] + 0.5 * begun["duration"][0])
     split = simulate(
         table | {"load": {"idle": idle}, "event": {"cut": {"release": "load.idle", "at": f"{middle!r} s"}}}
     )
     for found, exact in zip(state(split), state(whole), strict=True):
         assert found == pytest.approx(exact, abs=1e-9)
+
+
+#: heights are compared after the first impact and after the second one [s]
+AFTER = (4e-3, 6e-3)
+
+
+def test_stiffer_corners_come_close_to_newtons_law_for_rigid_ones() -> None:
+    """The slider-crank of Flores, Leine & Glocker (2010), without friction: in proportion to the impacts' duration.
+
+    That goes with stiffness to the power -2/5 (Hertz), to first order.
+    """
+    exact = rigid_heights(AFTER, (150.0, -75.0), 1e-3, 0.4, 9.81)
+    away = []
+    for stiffness in (1e11, 1e12, 1e13):
+        numbers = {"time.end": 8e-3, "output.interval": 1e-3, "solver.rtol": 1e-11}
+        changes = numbers | {"joint.guide.normal.stiffness": stiffness, "joint.guide.friction": None}
+        dataset = simulated(edited(load_scene(TREE / "scenes/gallery/loose_slider.toml"), changes))
+        away.append(
+            dataset.position.sel(body="slider", axis="y").sel(time=list(AFTER), method="nearest").values - exact
+        )
+    assert np.abs(away[-1]).max() < 2e-6
+    assert np.array(away[:-1]) / np.array(away[1:]) == pytest.approx(np.full((2, 2), 10.0**0.4), rel=0.05)
 
 
 # What else a scene can ask of it --------------------------------------------------------------------------------------
