@@ -7,12 +7,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.dynamics.linear.clearance_response import bounds
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.run.run import integrate
+from flexclear.dynamics.sensitivity.dataset import sensitivities
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import edited, load_scene
+from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import effects, ideal
 from flexclear.system.errors import InputError
-from tests.analytic.mechanism_runs import TREE, impacts
+from flexclear.system.progress import silent
+from tests.analytic.mechanism_runs import TREE, bundles, impacts
 from tests.properties.mechanisms import LEAN, Table, frame, joint, matrix, rigid, scene, simulate, simulated, turned
 from tests.reference.sliders import final_state, rigid_heights
 
@@ -238,3 +244,54 @@ def test_a_slider_that_starts_in_the_guides_face_is_refused() -> None:
     with pytest.raises(InputError, match="starts with a penetration of 500 um into the guide"):
         simulate(table)
     assert edited(Scene.model_validate(table), {"joint.guide.clearance": 2e-3}) is not None
+
+
+@pytest.mark.parametrize(
+    "name", ["sps4/csj", "checks/scotch_yoke", "checks/ball_on_plane", "checks/clearance_slider_crank"]
+)
+def test_a_joint_with_one_pair_is_the_contact_itself_at_its_frames(name: str) -> None:
+    """Its name, numbers and sites are the joint's, to the last bit, so that its runs and their layout are as well."""
+    whole = load_scene(TREE / "scenes" / f"{name}.toml")
+    mechanism = build(whole, {})
+    assert [contact.name for contact in mechanism.contacts] == [*whole.contacts()]
+    for contact in mechanism.contacts:
+        assert contact.joint is whole.joint[contact.name]
+        for site, at in zip((contact.outer, contact.inner), whole.joint[contact.name].between, strict=True):
+            same = mechanism.site(at)
+            assert (site.link, site.frame) == (same.link, same.frame)
+            assert np.array_equal(site.placement.p, same.placement.p)
+            assert np.array_equal(site.placement.R, same.placement.R)
+
+
+def test_a_corner_beside_a_frame_of_a_flexible_body_is_refused() -> None:
+    """Such a frame bends with the body, and what is beside it may not be on the body at all."""
+    rod = load_scene(TREE / "scenes/checks/swinging_rod.toml")
+    guide = joint("clearance-prismatic", "ground.hook", "rod.top") | SLIDER
+    with pytest.raises(InputError, match="fix a rigid body to the frame"):
+        build(edited(rod, {"joint.guide": guide}), bundles(rod))
+
+
+def test_the_clearance_of_a_guide_has_a_derivative() -> None:
+    """A slider that comes back from its guide is 2 dc farther away: it travels the wider gap there and back."""
+    whole = Scene.model_validate(sliding([0.5, 0.0, 2.0], end=0.005))
+    found = sensitivities(whole, {}, silent, ["body.position"], ["joint.guide.clearance", "joint.guide.height"])
+    by_gap, by_height = (found["body.position"].sel(parameter=f"joint.guide.{key}") for key in ("clearance", "height"))
+    assert by_gap.values[-1] == pytest.approx([2.0, 0.0, 0.0], abs=1e-7)
+    assert by_height.values[-1] == pytest.approx([0.0, 0.0, 0.0], abs=1e-7)
+
+
+def test_a_slider_tilts_no_farther_than_the_bound_of_its_clearance_says() -> None:
+    """Bound of the effect: 2 clearance/length without load, and the same for what the corners give way."""
+    loose = Scene.model_validate(
+        sliding([0.3, 0.0, 1.0], [0.0, 5.0, 0.0], end=0.02, normal=LINEAR | {"stiffness": 1e9})
+    )
+    tight = ideal(Scene.model_validate(sliding([0.0, 0.0, 1.0])))
+    chosen = [parse("body.orientation", loose.owners())]
+    bound = bounds(loose, integrate(tight, {}, silent), chosen)["guide"]
+    assert bound["body.orientation"] == pytest.approx(2.0 * GAP / LENGTH, rel=1e-6)
+    dataset = simulated(loose)
+    deep = float(dataset.contact_penetration.max())
+    tilt = 2.0 * np.abs(dataset.quaternion.sel(body="body").values[:, 2])
+    # a part of the height's tilt counts as well: height tilt^2 / 2
+    assert tilt.max() <= 2.0 * (GAP + deep) / LENGTH * (1.0 + 1e-3)
+    assert np.abs(dataset.position.sel(body="body").values[:, 0]).max() <= GAP + deep
