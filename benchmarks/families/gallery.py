@@ -70,8 +70,8 @@ def _slider_crank(run: xr.Dataset, scene: Scene) -> str:
 
 
 def _slider(run: xr.Dataset, scene: Scene) -> str:
-    post, axis = derive(run), run["quaternion"].sel(body="slider")
-    tilt = 2e3 * float(np.abs(axis.sel(quaternion_component="z")).max())
+    post = derive(run)
+    tilt = 2e3 * np.abs(run["quaternion"].sel(body="slider").values[:, 3]).max()
     return (
         f"Its corners hit it {int(post['impact_count'].sum())} times in {1e3 * scene.time.end:.0f} ms, with up to "
         f"{float(post['peak_force'].max()):.3g} N; it tilts by up to {tilt:.2g} mrad."
