@@ -271,6 +271,8 @@ class _Contact(Part):
     initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
     """impact rate of a contact that exists at the start, which is refused otherwise; 0 for a resting one"""
 
+    #: share of stiffness and damping of the normal law that the contact has
+    share: ClassVar[float] = 1.0
     #: names of the outer and the inner surface in keys
     surfaces: ClassVar[tuple[str, str]]
     #: the ideal joint that constrains the two frames in addition to the contact; None for the contact alone
@@ -303,6 +305,11 @@ class _Contact(Part):
         """Materials of the outer and the inner surface."""
         outer, inner = (getattr(self, f"{surface}_material") for surface in self.surfaces)
         return outer, inner
+
+    @property
+    def arm(self) -> float:
+        """Distance of the surfaces from the middle of the inner one [m]."""
+        return self.radius
 
     @property
     def shape(self) -> tuple[float, float]:
@@ -363,13 +370,149 @@ class ClearanceSpherical(_Ball, _Worn):
     """elastic constants, for the stiffness"""
 
 
-class ClearanceRevolute(Pin, _Worn):
-    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
+@dataclass(frozen=True)
+class Feature:
+    """One of several contacts of a joint, with the attributes of a joint that is one contact.
 
-    surfaces, ideal, across = ("journal", "pin"), "revolute", (0, 1)
-    type: Literal["clearance-revolute"]
+    Those that the contacts of a joint have in common are the joint's: laws, frames, materials.
+    share: of the stiffness and damping of the joint's normal law.
+    """
+
+    joint: Any
+    name: str
+    clearance: float
+    share: ClassVar[float] = 1.0
+    shape: ClassVar[tuple[float, float]] = (0.0, 0.0)
+
+    def __getattr__(self, key: str) -> Any:
+        """Return an attribute of the joint; copies are made before they have one."""
+        if key == "joint":
+            raise AttributeError(key)
+        return getattr(self.joint, key)
+
+    @property
+    def initial_approach_speed(self) -> float | None:
+        """Impact rate of this contact, if its surfaces touch at the start."""
+        given = self.joint.initial_approach_speed
+        return given.get(self.name) if isinstance(given, dict) else given
+
+    @property
+    def arm(self) -> float:
+        """Distance of the surfaces from the middle of the inner one [m]."""
+        return float(self.radius)
+
+
+class Corner(Feature):
+    """Corner of one part of a sliding joint above a face of the other."""
+
+    type, hollow, across = "ball-on-plane", False, (2,)
+
+
+class Rim(Feature):
+    """End of a journal round the axis of a pin that may tilt: the circles meet on the journal's rim."""
+
+    type, hollow, share = "clearance-revolute", True, 0.5
+
+    @property
+    def arm(self) -> float:
+        """Distance of the rim from its centre [m], negative as the journal is the inner feature here."""
+        return -float(self.radius + self.clearance)
+
+
+class Crown(Feature):
+    """Crowned face of a pin's collar above an end of the journal."""
+
+    type, hollow, across = "ball-on-plane", False, (2,)
+
+    @property
+    def radius(self) -> float:
+        """Radius of curvature of the face [m]."""
+        return float(self.joint.thrust_radius or self.joint.pin_radius)
+
+
+class _Several(_Contact):
+    """Keys of joints that may have several contacts."""
+
+    initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | dict[str, Annotated[Speed, Field(ge=0.0)]] | None = None
+    """impact rate of contacts that exist at the start, which are refused otherwise, or a table of rates by contact; 0
+    for resting ones"""
+
+    @model_validator(mode="after")
+    def _known_contacts(self) -> Self:
+        given = self.initial_approach_speed
+        unknown = [name for name in given if name not in self.pairs] if isinstance(given, dict) else []
+        if unknown:
+            known = ", ".join(filter(None, self.pairs)) or "none, as the joint is one contact"
+            raise ValueError(f"initial_approach_speed: there is no '{unknown[0]}'; known: {known}")
+        return self
+
+
+class _Tilting(Pin, _Several):
+    """Keys of pins that may tilt in their journal."""
+
+    surfaces = ("journal", "pin")
     journal_material: Material | None = None
     """elastic constants, for the stiffness"""
+
+    @property
+    def rims(self) -> dict[str, Pair]:
+        """Pairs of the pin and the journal's two ends, ``end_1`` at positive z, each with half of the stiffness."""
+        ends = {f"end_{k}": Seat((0.0, 0.0, side * 0.5 * self.length)) for k, side in ((1, 1.0), (2, -1.0))}
+        return {name: Pair(Rim(self, name, self.clearance), end, end, swapped=True) for name, end in ends.items()}
+
+
+class ClearanceRevolute(_Tilting, _Worn):
+    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame.
+
+    Its axial motion and its tilt are held, unless it has an `axial_clearance`.
+    """
+
+    ideal, across = "revolute", (0, 1)
+    type: Literal["clearance-revolute"]
+    axial_clearance: Annotated[Length, Positive] | None = None
+    """gap between either end of the journal and the pin's collar there; the pin then tilts within its clearance, and
+    nothing is held but by contacts at both ends and the collars"""
+    thrust_radius: Annotated[Length, Positive] | None = None
+    """radius of curvature of the collars' faces; default: the pin's radius"""
+
+    @model_validator(mode="after")
+    def _tilting(self) -> Self:
+        given = next((key for key in ("thrust_radius",) if getattr(self, key) is not None), "")
+        if self.axial_clearance is None and given:
+            raise ValueError(f"{given} is of collars, which need an axial_clearance; give both or neither")
+        if self.axial_clearance is not None and self.wear is not None:
+            raise ValueError("the wear of a pin that tilts is not computed; leave out wear or axial_clearance")
+        return self
+
+    @property
+    def held(self) -> str | None:  # type: ignore[override]
+        """The ideal joint that holds axial motion and tilt."""
+        return "planar" if self.axial_clearance is None else None
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """The pin in its journal; of one that tilts both ends, and the collars ``thrust_1`` at positive z and 2."""
+        gap = self.axial_clearance
+        if gap is None:
+            return super().pairs
+        made = self.rims
+        for k, side in ((1, 1.0), (2, -1.0)):
+            crown = Crown(self, f"thrust_{k}", gap)
+            face = Seat((0.0, 0.0, side * 0.5 * self.length), facing(2, side))
+            made[crown.name] = Pair(crown, face, Seat((0.0, 0.0, side * (0.5 * self.length + gap + crown.radius))))
+        return made
+
+
+class ClearanceCylindrical(_Tilting):
+    """Pin in journal with radial clearance that slides along the axis, z of the journal's frame, and tilts."""
+
+    ideal, held = "cylindrical", None
+    type: Literal["clearance-cylindrical"]
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """The two ends of the journal."""
+        return self.rims
 
 
 class ClearanceSlot(Pin):
@@ -411,31 +554,7 @@ class BallOnPlane(_Ball):
         return self.ball_radius
 
 
-@dataclass(frozen=True)
-class Corner:
-    """Corner of one part of a sliding joint above a face of the other, with the attributes of a contact."""
-
-    joint: "ClearancePrismatic"
-    name: str
-    clearance: float
-
-    type: ClassVar[str] = "ball-on-plane"
-    hollow: ClassVar[bool] = False
-    shape: ClassVar[tuple[float, float]] = (0.0, 0.0)
-    across: ClassVar[tuple[int, ...]] = (2,)
-
-    def __getattr__(self, key: str) -> Any:
-        """Return what all corners of a joint have in common: laws, frames, materials, radius."""
-        return getattr(self.joint, key)
-
-    @property
-    def initial_approach_speed(self) -> float | None:
-        """Impact rate of the corner, if it touches at the start."""
-        given = self.joint.initial_approach_speed
-        return given.get(self.name) if isinstance(given, dict) else given
-
-
-class ClearancePrismatic(_Clearance):
+class ClearancePrismatic(_Clearance, _Several):
     """Rectangular slider in a guide with clearance; between = [guide frame, slider frame], each in the middle.
 
     It slides along z of the guide's frame. Without `width` it also moves across its height, along x, and turns about y,
@@ -459,9 +578,6 @@ class ClearancePrismatic(_Clearance):
     """length of a guide that is shorter than the slider; default: longer than the slider's travel"""
     corner_radius: Annotated[Length, Field(ge=0.0)] = 0.0
     """radius of the corners; default: sharp ones, which need a normal.stiffness"""
-    initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | dict[str, Annotated[Speed, Field(ge=0.0)]] | None = None
-    """impact rate of the corners that touch at the start, which is refused otherwise, or a table of rates by corner; 0
-    for a resting slider"""
     guide_material: Material | None = None
     """elastic constants, for the stiffness"""
     slider_material: Material | None = None
@@ -487,13 +603,7 @@ class ClearancePrismatic(_Clearance):
             raise ValueError(
                 f"corner_radius = {self.corner_radius:g} m must be less than half the shortest side, {short:g} m"
             )
-        unknown = [name for name in self._given_speeds() if name not in self.pairs]
-        if unknown:
-            raise ValueError(f"initial_approach_speed: there is no '{unknown[0]}'; known: {', '.join(self.pairs)}")
         return self
-
-    def _given_speeds(self) -> dict[str, float]:
-        return self.initial_approach_speed if isinstance(self.initial_approach_speed, dict) else {}
 
     @property
     def held(self) -> str | None:  # type: ignore[override]
@@ -542,7 +652,9 @@ def facing(axis: int, side: float) -> tuple[tuple[float, float, float], ...]:
     return (x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])
 
 
-Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | ClearancePrismatic | BallOnPlane
+Clearance = (
+    ClearanceSpherical | ClearanceRevolute | ClearanceCylindrical | ClearanceSlot | ClearancePrismatic | BallOnPlane
+)
 #: all types of contacts
 CONTACTS: tuple[Any, ...] = get_args(Clearance)
 #: their classes by type

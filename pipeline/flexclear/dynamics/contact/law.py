@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import NamedTuple
 
@@ -40,6 +40,14 @@ class Resolved:
     parameter: float | None
     delivered: float | None
     warning: str | None = None
+
+    def shared(self, share: float) -> Resolved:
+        """Return the law of one of several contacts that have it together, each a share of its force."""
+        if share == 1.0:
+            return self
+        stiffness, exponent, damping = self.numbers
+        damped = damping * share if self.form == "linear-damper" else damping
+        return replace(self, numbers=Numbers(stiffness * share, exponent, damped))
 
     def depth(self, force: float) -> float:
         """Return the penetration [m or rad] whose elastic force is `force` [N or N m], >= 0."""

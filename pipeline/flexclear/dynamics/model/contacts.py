@@ -61,7 +61,7 @@ def fill(
         bends = bristle(name, joint) is not None
         rows.append((*sites, *kinds_of, first if bends else -1))
         first += 3 * bends
-        sizes = (joint.clearance, joint.radius, _floor(joint, length))
+        sizes = (joint.clearance, joint.arm, _floor(joint, length))
         reals.append([*sizes, stick, *law.numbers, *numbers, *shape, length])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
@@ -129,7 +129,7 @@ def resolve_law(joint: Clearance | End, mass: float | None, path: str) -> Resolv
         law: Resolved = NORMAL_LAWS[normal.law](normal, stiffness, mass)
     except ValueError as error:
         raise InputError(path, str(error)) from None
-    return law
+    return law if isinstance(joint, End) else law.shared(joint.share)
 
 
 def _reduced_mass(masses: Sequence[float]) -> float | None:

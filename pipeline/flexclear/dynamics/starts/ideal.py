@@ -16,6 +16,7 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.driving import label
+from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.start_table import Given, given_coordinates
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.record.wrenches import joint_wrenches
@@ -26,6 +27,7 @@ from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start, per_speed, project
 from flexclear.dynamics.run.run import maker
 from flexclear.dynamics.starts.snapshot import with_held_drives, with_poses_and_velocities, with_resting_contacts
+from flexclear.scene.clearance import Crown, Rim, Seat
 from flexclear.scene.laws import Polynomial
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
@@ -164,29 +166,44 @@ def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> Forces:
     return {name: (n[0], f[0]) for name, (n, f) in joint_wrenches(Motions(engine.model, seen)).items()}
 
 
-def _loads(engine: Engine, forces: Forces) -> Iterator[tuple[int, float | None]]:
+def _loads(engine: Engine, forces: Forces) -> Iterator[tuple[int, np.ndarray | float]]:
     """Yield each contact of a joint without clearance in the ideal mechanism, by number, with the load on it [N].
 
-    Of a slider in a plane these are the corners at both ends that force and moment of the joint press; a slider that
-    is loose across its width begins in the middle. The load is None for a pin, on which the whole force acts.
+    It is the force on the inner part of a pin, whole or at one of its ends, and the size of that on a collar or corner.
+    Of a slider in a plane the corners at both ends that force and moment of the joint press are yielded; a slider that
+    is loose across its width begins in the middle.
     """
     frames, table = engine.table(m.SITE_FRAMES), engine.model.arrays.table(m.CONTACTS)
     loose = replaceable_contacts(engine.model.scene)
     for c, (name, pair) in enumerate(engine.model.scene.pairs().items()):
         owner = name.partition(".")[0]
+        if owner not in loose:
+            continue
+        moment, force = forces[owner]
+        sides = ("inner", "outer") if pair.swapped else ("outer", "inner")
+        first, second = (_joint_frame(frames[table[c][side]], getattr(pair, side)) for side in sides)
+        x, y, z = first.R.T
+        along = float(z @ (second.p - first.p))
         if name in loose:
-            yield c, None
-        elif owner in loose and loose[owner].held is not None:
-            seats = (pair.inner, pair.outer) if pair.swapped else (pair.outer, pair.inner)
-            axes = frames[table[c]["inner" if pair.swapped else "outer"]]["axes"] @ np.array(seats[0].axes).T
-            corner, end = (frames[table[c][side]]["origin"] for side in ("inner", "outer"))
-            arm = pair.inner.origin[2]
-            slid = float(axes[:, 2] @ (end - corner)) + arm - pair.outer.origin[2] if pair.swapped else 0.0
-            moment, force = forces[owner]
-            push = float(axes[:, 0] @ force)
-            load = 0.5 * (push + (float(axes[:, 1] @ moment) + slid * push) / arm)
-            if load * pair.inner.origin[0] < 0.0:
-                yield c, abs(load)
+            yield c, force
+        elif isinstance(pair.contact, Rim):
+            end = pair.inner.origin[2]
+            tilting = np.cross(moment, z) + (along + end) * force
+            yield c, -(tilting - z * (z @ tilting)) / (2.0 * end)
+        elif isinstance(pair.contact, Crown):
+            pressing = float(z @ force) * np.sign(pair.inner.origin[2])
+            yield from ((c, pressing) for _ in range(pressing > 0.0))
+        elif loose[owner].held is not None:
+            arm, push = pair.inner.origin[2], float(x @ force)
+            slid = along if pair.swapped else 0.0
+            load = 0.5 * (push + (float(y @ moment) + slid * push) / arm)
+            yield from ((c, abs(load)) for _ in range(load * pair.inner.origin[0] < 0.0))
+
+
+def _joint_frame(site: np.void, seat: Seat) -> Placement:
+    """Return the frame of a joint in which a site has its seat."""
+    axes = site["axes"] @ np.array(seat.axes).T
+    return Placement(site["origin"] - axes @ np.array(seat.origin), axes)
 
 
 def _press_pins(engine: Engine, y: np.ndarray, forces: Forces) -> np.ndarray:
@@ -211,10 +228,10 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Forces) -> np.ndarray:
         missing = []
         for row, contact, law, load in pins:
             across, offset, _ = along(row, contact.joint)
-            if load is not None:
+            if isinstance(load, float):
                 missing.append(contact.joint.radius - law.depth(load) - offset)
                 continue
-            force = across @ forces[contact.name][1]
+            force = across @ load
             size = float(np.linalg.norm(force))
             pressed = contact.joint.clearance + law.depth(size)
             # forces below this fraction of the weight press nothing: the pin stays in the middle

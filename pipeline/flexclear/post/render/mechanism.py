@@ -257,7 +257,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
                 yield at.seated(first, _floor(at, joint, size), GROUND_COLOR)
             else:
                 yield at.seated(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
-        elif "revolute" in kind or "slot" in kind:
+        elif "revolute" in kind or "slot" in kind or kind == "clearance-cylindrical":
             radius = float(joint.get("pin_radius", PIN * size))
             long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # the links would hide shorter ones
             yield at.seated(second, surfaces.cylinder(radius, long), color, contact)

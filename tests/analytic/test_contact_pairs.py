@@ -1,4 +1,4 @@
-"""Sliders that are loose in their guides: corners on faces, against closed forms and a second derivation."""
+"""Joints of several contacts, loose sliders and pins that tilt, against closed forms and a second derivation."""
 
 from itertools import product
 from typing import Any
@@ -20,7 +20,7 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, impacts
 from tests.properties.mechanisms import LEAN, Table, frame, joint, matrix, rigid, scene, simulate, simulated, turned
-from tests.reference.sliders import final_state, rigid_heights
+from tests.reference.sliders import corners, final_state, rigid_heights, rims
 
 MASS, INERTIA = 0.5, [6e-4, 4e-4, 2e-4]
 LENGTH, HEIGHT, WIDTH, GAP, SIDE = 0.1, 0.04, 0.06, 1e-3, 0.8e-3
@@ -107,7 +107,8 @@ def test_corners_and_faces_push_as_in_a_second_derivation(case: str) -> None:
     short = "guide_length" in given
     dataset = simulate(sliding(velocity, omega, short=short, **given))
     assert len(impacts(dataset)["start"]) >= 2
-    known = final_state(points, STIFFNESS, given.get("corner_radius", 0.0), MASS, INERTIA, velocity, omega, 0.01)
+    push = corners(points, STIFFNESS, given.get("corner_radius", 0.0))
+    known = final_state(push, 0.05 * np.sqrt(MASS / STIFFNESS), MASS, INERTIA, velocity, omega, 0.01)
     for found, exact in zip(state(dataset), known, strict=True):
         assert found == pytest.approx(exact, abs=1e-7 * max(1.0, float(np.abs(exact).max())))
     # the pairs' forces are summed at the joint, of which the second body is the moving one or the fixed one
@@ -295,3 +296,82 @@ def test_a_slider_tilts_no_farther_than_the_bound_of_its_clearance_says() -> Non
     # a part of the height's tilt counts as well: height tilt^2 / 2
     assert tilt.max() <= 2.0 * (GAP + deep) / LENGTH * (1.0 + 1e-3)
     assert np.abs(dataset.position.sel(body="body").values[:, 0]).max() <= GAP + deep
+
+
+# Pins that tilt -------------------------------------------------------------------------------------------------------
+BEARING, PIN, RADIAL, AXIAL = 0.03, 0.01, 1e-4, 2e-4
+PINNED: Table = {"clearance": RADIAL, "pin_radius": PIN, "length": BEARING, "normal": LINEAR}
+
+
+def pinned(velocity: Any, omega: Any = (0.0, 0.0, 0.0), kind: str = "clearance-revolute", **more: Any) -> Table:
+    """A pin in the middle of a fixed journal; more: of the joint."""
+    moving = rigid(MASS, INERTIA, {"F": {}}, pose={}, velocity=list(velocity), angular_velocity=list(omega))
+    pin = joint(kind, "ground.F", "body.F") | PINNED | more
+    return scene({"ground": {"type": "ground", "frames": {"F": {}}}, "body": moving}, {"pin": pin}, 0.005)
+
+
+def test_a_pin_that_does_not_tilt_moves_as_one_that_is_held() -> None:
+    """Both ends share stiffness and force of the joint in a plane; friction turns the pin alike."""
+    rough = {"law": "ambrosio", "dynamic": 0.2, "v0": 0.0, "v1": 1e-3}
+    start, law = ([0.1, 0.05, 0.0], [0.0, 0.0, 30.0]), {"law": "kelvin-voigt", "stiffness": 1e6, "restitution": 0.5}
+    held, free = (
+        simulate(pinned(*start, friction=rough, normal=law, **more)) for more in ({}, {"axial_clearance": AXIAL})
+    )
+    assert list(held.contact.values) == ["pin"]
+    assert list(free.contact.values) == ["pin.end_1", "pin.end_2", "pin.thrust_1", "pin.thrust_2"]
+    for found, exact in zip(state(free), state(held), strict=True):
+        assert found == pytest.approx(exact, abs=1e-9)
+    assert free.joint_force.values == pytest.approx(held.joint_force.values, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["clearance-revolute", "clearance-cylindrical"])
+def test_tilting_pins_touch_the_ends_of_their_journals_as_in_a_second_derivation(kind: str) -> None:
+    """One end, then the other or a collar; the run and SciPy's are both good to about 1e-10."""
+    velocity, omega, crown = [0.1, 0.05, 0.2], [4.0, 2.0, 3.0], 0.015
+    thrust = {"axial_clearance": AXIAL, "thrust_radius": crown} if kind == "clearance-revolute" else {}
+    dataset = simulate(pinned(velocity, omega, kind, **thrust))
+    hit = set(impacts(dataset)["start"].tolist())
+    assert len(hit) >= 3
+    ends, z = rims(BEARING, PIN, RADIAL, 0.5 * STIFFNESS), np.array([0.0, 0.0, 1.0])
+    collars = [(s * (0.5 * BEARING + AXIAL + crown) * z, s * 0.5 * BEARING * z, s * z) for s in (1.0, -1.0)]
+    faces = corners(collars, STIFFNESS, crown)
+
+    def push(p: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        both = [ends(p, R), *([faces(p, R)] if thrust else [])]
+        return np.concatenate([forces for forces, _ in both]), np.concatenate([points for _, points in both])
+
+    known = final_state(push, 0.05 * np.sqrt(MASS / STIFFNESS), MASS, INERTIA, velocity, omega, 0.005)
+    for found, exact in zip(state(dataset), known, strict=True):
+        assert found == pytest.approx(exact, abs=1e-7 * max(1.0, float(np.abs(exact).max())))
+    assert np.abs(dataset.energy_error.values).max() < 1e-8 * float(dataset.kinetic[0])
+    force = dataset.joint_force.sel(joint="pin").values
+    assert force == pytest.approx(MASS * dataset.acceleration.sel(body="body").values, abs=1e-9 * np.abs(force).max())
+
+
+def test_an_ideal_start_presses_both_ends_of_a_tilted_pin_and_a_collar() -> None:
+    """By the lever: a force at 0.8 of the half length and one along the axis."""
+    table, at = pinned([0.0] * 3, axial_clearance=AXIAL), 0.4 * BEARING
+    table["body"]["body"]["frames"]["P"] = {"position": [0.0, 0.0, at]}
+    table["load"] = {
+        "across": {"type": "point-force", "frame": "body.P", "force": [-30.0, 0.0, 0.0]},
+        "along": {"type": "point-force", "frame": "body.F", "force": [0.0, 0.0, -20.0]},
+    }
+    table["joint"]["pin"]["normal"] = LINEAR | {"stiffness": 1e8}
+    table["start"] = {"at": "ideal"}
+    dataset = simulated(Scene.model_validate(table))
+    assert dataset.contact_normal_force.values[0] == pytest.approx([27.0, 3.0, 20.0, 0.0], rel=1e-4, abs=1e-4)
+
+
+#: change of the joint, and what the refusal says
+REFUSED_PINS: dict[str, tuple[Table, str]] = {
+    "collar without gap": ({"thrust_radius": 0.02}, "axial_clearance"),
+    "wear": ({"axial_clearance": AXIAL, "wear": {"coefficient": 1e-4, "hardness": 2e9}}, "is not computed"),
+    "unknown end": ({"initial_approach_speed": {"end_1": 0.1}}, "none, as the joint is one contact"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED_PINS)
+def test_a_pin_that_cannot_tilt_is_refused_in_words(case: str) -> None:
+    changed, words = REFUSED_PINS[case]
+    with pytest.raises(ValueError, match=words):
+        Scene.model_validate(pinned([0.0] * 3, **changed))
