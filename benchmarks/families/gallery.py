@@ -69,6 +69,15 @@ def _slider_crank(run: xr.Dataset, scene: Scene) -> str:
     )
 
 
+def _slider(run: xr.Dataset, scene: Scene) -> str:
+    post = derive(run)
+    tilt = 2e3 * np.abs(run["quaternion"].sel(body="slider").values[:, 3]).max()
+    return (
+        f"Its corners hit it {int(post['impact_count'].sum())} times in {1e3 * scene.time.end:.0f} ms, with up to "
+        f"{float(post['peak_force'].max()):.3g} N; it tilts by up to {tilt:.2g} mrad."
+    )
+
+
 def _scott_russell(run: xr.Dataset, scene: Scene) -> str:
     point = run["frame_position"].sel(frame="rod.point")
     way = float(abs(point.sel(axis="y")[-1] - point.sel(axis="y")[0]))
@@ -280,6 +289,7 @@ ENTRIES = {
         Entry("gallery/cam", "How hard must a motor turn a cam that lifts a spring-loaded follower?", _cam),
         Entry("gallery/backlash", "How much of a swing does the backlash of a gear pair take?", _backlash),
         Entry("checks/scotch_yoke", "How often does a loose pin hit its slot?", _yoke),
+        Entry("gallery/loose_slider", "How does a slider hit its guide that is 1 mm too wide on each side?", _slider),
         Entry("checks/ball_on_plane", "How often does a ball bounce in half a second?", _balls),
         Entry("gallery/rolling_ball", "How far does a ball roll down a slope in a second?", _rolling, at=1.0),
         Entry("checks/bushing", "How far does a block move on its rubber mount?", _bushing),

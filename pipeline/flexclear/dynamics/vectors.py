@@ -214,6 +214,13 @@ def to_quaternion(R):
 
 
 @kernel
+def about_y(angle):
+    """Return the rotation matrix of a rotation about y [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return (c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c)
+
+
+@kernel
 def about_z(angle):
     """Return the rotation matrix of a rotation about z [rad]."""
     c, s = np.cos(angle), np.sin(angle)

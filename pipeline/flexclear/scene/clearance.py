@@ -3,7 +3,9 @@
 The friction law 'modified-coulomb' is described in `dynamics.contact.friction.modified_coulomb`.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, Union, get_args
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, Union, get_args
 
 from pydantic import Field, create_model, model_validator
 
@@ -327,6 +329,37 @@ class Wear(Part):
     socket also into bands of equal area"""
 
 
+class Seat(NamedTuple):
+    """Place of a feature in the frame of its joint: origin [m], and its axes there, as rows of the rotation matrix."""
+
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+#: at the frame itself
+MIDDLE = Seat()
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two features of a joint that may touch, each at its seat in a frame of the joint.
+
+    contact: their surfaces and laws, with the attributes of a joint that is one contact.  swapped: the outer feature is
+    on the joint's second body.
+    """
+
+    contact: Any
+    outer: Seat = MIDDLE
+    inner: Seat = MIDDLE
+    swapped: bool = False
+
+    @property
+    def between(self) -> tuple[tuple[str, Seat], tuple[str, Seat]]:
+        """Frame of the joint and seat in it, of the outer and the inner feature."""
+        frames = self.contact.between[::-1] if self.swapped else self.contact.between
+        return (frames[0], self.outer), (frames[1], self.inner)
+
+
 class _Contact(Part):
     """Keys of all contacts between surfaces."""
 
@@ -342,6 +375,8 @@ class _Contact(Part):
     initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
     """impact rate of a contact that exists at the start, which is refused otherwise; 0 for a resting one"""
 
+    #: share of stiffness and damping of the normal law that the contact has
+    share: ClassVar[float] = 1.0
     #: names of the outer and the inner surface in keys
     surfaces: ClassVar[tuple[str, str]]
     #: the ideal joint that constrains the two frames in addition to the contact; None for the contact alone
@@ -376,9 +411,23 @@ class _Contact(Part):
         return outer, inner
 
     @property
+    def arm(self) -> float:
+        """Distance of the surfaces from the middle of the inner one [m]."""
+        return self.radius
+
+    @property
     def shape(self) -> tuple[float, float]:
         """Further sizes that the kernels of the surfaces need."""
         return 0.0, 0.0
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """Pairs of features that may touch, by name; an empty name stands for the only pair."""
+        return {"": Pair(self)}
+
+    def begun(self, speeds: Mapping[str, float]) -> Self:
+        """Return the joint with initial approach speeds [m/s] of pairs that touch at the start, by name."""
+        return self.model_copy(update={"initial_approach_speed": speeds.get("", dict(speeds))})
 
 
 class _Clearance(_Contact):
@@ -425,13 +474,149 @@ class ClearanceSpherical(_Ball, _Worn):
     """elastic constants, for the stiffness"""
 
 
-class ClearanceRevolute(Pin, _Worn):
-    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
+@dataclass(frozen=True)
+class Feature:
+    """One of several contacts of a joint, with the attributes of a joint that is one contact.
 
-    surfaces, ideal, across = ("journal", "pin"), "revolute", (0, 1)
-    type: Literal["clearance-revolute"]
+    Those that the contacts of a joint have in common are the joint's: laws, frames, materials.
+    share: of the stiffness and damping of the joint's normal law.
+    """
+
+    joint: Any
+    name: str
+    clearance: float
+    share: ClassVar[float] = 1.0
+    shape: ClassVar[tuple[float, float]] = (0.0, 0.0)
+
+    def __getattr__(self, key: str) -> Any:
+        """Return an attribute of the joint; copies are made before they have one."""
+        if key == "joint":
+            raise AttributeError(key)
+        return getattr(self.joint, key)
+
+    @property
+    def initial_approach_speed(self) -> float | None:
+        """Impact rate of this contact, if its surfaces touch at the start."""
+        given = self.joint.initial_approach_speed
+        return given.get(self.name) if isinstance(given, dict) else given
+
+    @property
+    def arm(self) -> float:
+        """Distance of the surfaces from the middle of the inner one [m]."""
+        return float(self.radius)
+
+
+class Corner(Feature):
+    """Corner of one part of a sliding joint above a face of the other."""
+
+    type, hollow, across = "ball-on-plane", False, (2,)
+
+
+class Rim(Feature):
+    """End of a journal round the axis of a pin that may tilt: the circles meet on the journal's rim."""
+
+    type, hollow, share = "clearance-revolute", True, 0.5
+
+    @property
+    def arm(self) -> float:
+        """Distance of the rim from its centre [m], negative as the journal is the inner feature here."""
+        return -float(self.radius + self.clearance)
+
+
+class Crown(Feature):
+    """Crowned face of a pin's collar above an end of the journal."""
+
+    type, hollow, across = "ball-on-plane", False, (2,)
+
+    @property
+    def radius(self) -> float:
+        """Radius of curvature of the face [m]."""
+        return float(self.joint.thrust_radius or self.joint.pin_radius)
+
+
+class _Several(_Contact):
+    """Keys of joints that may have several contacts."""
+
+    initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | dict[str, Annotated[Speed, Field(ge=0.0)]] | None = None
+    """impact rate of contacts that exist at the start, which are refused otherwise, or a table of rates by contact; 0
+    for resting ones"""
+
+    @model_validator(mode="after")
+    def _known_contacts(self) -> Self:
+        given = self.initial_approach_speed
+        unknown = [name for name in given if name not in self.pairs] if isinstance(given, dict) else []
+        if unknown:
+            known = ", ".join(filter(None, self.pairs)) or "none, as the joint is one contact"
+            raise ValueError(f"initial_approach_speed: there is no '{unknown[0]}'; known: {known}")
+        return self
+
+
+class _Tilting(Pin, _Several):
+    """Keys of pins that may tilt in their journal."""
+
+    surfaces = ("journal", "pin")
     journal_material: Material | None = None
     """elastic constants, for the stiffness"""
+
+    @property
+    def rims(self) -> dict[str, Pair]:
+        """Pairs of the pin and the journal's two ends, ``end_1`` at positive z, each with half of the stiffness."""
+        ends = {f"end_{k}": Seat((0.0, 0.0, side * 0.5 * self.length)) for k, side in ((1, 1.0), (2, -1.0))}
+        return {name: Pair(Rim(self, name, self.clearance), end, end, swapped=True) for name, end in ends.items()}
+
+
+class ClearanceRevolute(_Tilting, _Worn):
+    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame.
+
+    Its axial motion and its tilt are held, unless it has an `axial_clearance`.
+    """
+
+    ideal, across = "revolute", (0, 1)
+    type: Literal["clearance-revolute"]
+    axial_clearance: Annotated[Length, Positive] | None = None
+    """gap between either end of the journal and the pin's collar there; the pin then tilts within its clearance, and
+    nothing is held but by contacts at both ends and the collars"""
+    thrust_radius: Annotated[Length, Positive] | None = None
+    """radius of curvature of the collars' faces; default: the pin's radius"""
+
+    @model_validator(mode="after")
+    def _tilting(self) -> Self:
+        given = next((key for key in ("thrust_radius",) if getattr(self, key) is not None), "")
+        if self.axial_clearance is None and given:
+            raise ValueError(f"{given} is of collars, which need an axial_clearance; give both or neither")
+        if self.axial_clearance is not None and self.wear is not None:
+            raise ValueError("the wear of a pin that tilts is not computed; leave out wear or axial_clearance")
+        return self
+
+    @property
+    def held(self) -> str | None:  # type: ignore[override]
+        """The ideal joint that holds axial motion and tilt."""
+        return "planar" if self.axial_clearance is None else None
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """The pin in its journal; of one that tilts both ends, and the collars ``thrust_1`` at positive z and 2."""
+        gap = self.axial_clearance
+        if gap is None:
+            return super().pairs
+        made = self.rims
+        for k, side in ((1, 1.0), (2, -1.0)):
+            crown = Crown(self, f"thrust_{k}", gap)
+            face = Seat((0.0, 0.0, side * 0.5 * self.length), facing(2, side))
+            made[crown.name] = Pair(crown, face, Seat((0.0, 0.0, side * (0.5 * self.length + gap + crown.radius))))
+        return made
+
+
+class ClearanceCylindrical(_Tilting):
+    """Pin in journal with radial clearance that slides along the axis, z of the journal's frame, and tilts."""
+
+    ideal, held = "cylindrical", None
+    type: Literal["clearance-cylindrical"]
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """The two ends of the journal."""
+        return self.rims
 
 
 class ClearanceSlot(Pin):
@@ -473,7 +658,107 @@ class BallOnPlane(_Ball):
         return self.ball_radius
 
 
-Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane
+class ClearancePrismatic(_Clearance, _Several):
+    """Rectangular slider in a guide with clearance; between = [guide frame, slider frame], each in the middle.
+
+    It slides along z of the guide's frame. Without `width` it also moves across its height, along x, and turns about y,
+    and the rest is held; with `width` and `side_clearance` nothing is held but by the contacts. Corners of the slider
+    meet the faces of the guide, which are longer than its travel; those of a shorter guide meet the slider's faces.
+    """
+
+    surfaces, ideal, plane = ("guide", "slider"), "prismatic", (0, 2)
+    type: Literal["clearance-prismatic"]
+    clearance: Annotated[Length, Positive]
+    """gap on either side of the slider across its height, when it is in the middle"""
+    length: Annotated[Length, Positive]
+    """length of the slider, along z"""
+    height: Annotated[Length, Positive]
+    """height of the slider, along x"""
+    width: Annotated[Length, Positive] | None = None
+    """width of the slider, along y, when it is loose in this direction as well"""
+    side_clearance: Annotated[Length, Positive] | None = None
+    """gap on either side of the slider across its width"""
+    guide_length: Annotated[Length, Positive] | None = None
+    """length of a guide that is shorter than the slider; default: longer than the slider's travel"""
+    corner_radius: Annotated[Length, Field(ge=0.0)] = 0.0
+    """radius of the corners; default: sharp ones, which need a normal.stiffness"""
+    guide_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    slider_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Self:
+        if (self.width is None) != (self.side_clearance is None):
+            given, absent = ("width", "side_clearance") if self.width is not None else ("side_clearance", "width")
+            raise ValueError(
+                f"{given} is given and {absent} is not: a slider that is loose across its width, too, needs both, "
+                "a plane one neither"
+            )
+        if self.guide_length is not None and not self.guide_length < self.length:
+            raise ValueError(
+                f"guide_length = {self.guide_length:g} m is not below the slider's length, {self.length:g} m: it is of "
+                "a guide whose ends touch the slider's faces; leave it out where the slider's corners touch the guide"
+            )
+        if self.normal.stiffness is None and not self.corner_radius:
+            raise ValueError("the stiffness of sharp corners is unknown: give normal.stiffness, or corner_radius")
+        short = min(filter(None, (self.guide_length or self.length, self.height, self.width)))
+        if not 2.0 * self.corner_radius < short:
+            raise ValueError(
+                f"corner_radius = {self.corner_radius:g} m must be less than half the shortest side, {short:g} m"
+            )
+        return self
+
+    @property
+    def held(self) -> str | None:  # type: ignore[override]
+        """The ideal joint that holds a slider in its plane."""
+        return "guided" if self.width is None else None
+
+    @property
+    def radius(self) -> float:
+        """Radius of the corners [m]."""
+        return self.corner_radius
+
+    @property
+    def arms(self) -> tuple[float, float, float]:
+        """Distances of the corners that stop a turn about z, x and y of the guide [m]."""
+        long = self.guide_length or self.length
+        return self.width or self.height, long, long
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """Pairs of a corner and the face above it: ``corner_1`` to 4 or 8 across the height, ``side_1`` to 8."""
+        short, r = self.guide_length is not None, self.corner_radius
+        ends = 0.5 * (self.guide_length or self.length) - r
+        sizes = (0.5 * self.height, 0.5 * (self.width or 0.0), 0.5 * (self.guide_length or self.length))
+        gaps, made = (self.clearance, self.side_clearance or 0.0, 0.0), dict[str, Pair]()
+        # to the centre of a corner's sphere: of the slider's inwards from its faces, of the guide's outwards
+        inset = tuple(size + gap + r if short else size - r for size, gap in zip(sizes, gaps, strict=True))
+        loose = (0,) if self.width is None else (0, 1)
+        signs = [
+            (x, y, z) for x in (1.0, -1.0) for y in ((0.0,) if self.width is None else (1.0, -1.0)) for z in (1.0, -1.0)
+        ]
+        for axis, prefix in zip(loose, ("corner", "side"), strict=False):
+            for k, (x, y, z) in enumerate(signs, 1):
+                side, name = (x, y)[axis], f"{prefix}_{k}"
+                face = [0.0, 0.0, 0.0]
+                face[axis] = side * (sizes[axis] + (0.0 if short else gaps[axis]))
+                seats = Seat((face[0], face[1], face[2]), facing(axis, side if short else -side))
+                centre = Seat((x * inset[0], y * inset[1], z * ends))
+                made[name] = Pair(Corner(self, name, gaps[axis]), seats, centre, swapped=short)
+        return made
+
+
+def facing(axis: int, side: float) -> tuple[tuple[float, float, float], ...]:
+    """Return axes, as of a `Seat`, whose z is a frame's axis, or for a `side` of -1 points the other way."""
+    columns = ((axis + 1) % 3, side), ((axis + 2) % 3, 1.0), (axis, side)
+    x, y, z = ([value if k == row else 0.0 for k, value in columns] for row in range(3))
+    return (x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])
+
+
+Clearance = (
+    ClearanceSpherical | ClearanceRevolute | ClearanceCylindrical | ClearanceSlot | ClearancePrismatic | BallOnPlane
+)
 #: all types of contacts
 CONTACTS: tuple[Any, ...] = get_args(Clearance)
 #: their classes by type

@@ -28,7 +28,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
     """Return names by `quantity.OWNERS`, and whether each acts about an axis, so that forces are torques."""
     forces, contacts, moving = (
         scene.forces(),
-        scene.contacts(),
+        scene.pairs(),
         _still(name for name, body in scene.body.items() if not isinstance(body, Ground)),
     )
     stops = {f"{name}.{end}": turns(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import inf, pi, sqrt
 from typing import TYPE_CHECKING, Any
 
+from flexclear.scene.clearance import ClearancePrismatic
 from flexclear.scene.drives import JointDrive
 from flexclear.scene.laws import Constant, Harmonic, Piecewise, Repeated, Spline, Step, Sum
 from flexclear.scene.loads import Pid, SampledPid
@@ -36,9 +37,11 @@ def implausible(scene: Scene) -> list[InputError]:
 
 def _clearances(scene: Scene) -> Iterator[InputError]:
     for name, joint in scene.contacts().items():
-        if joint.clearance > joint.radius:
-            inner, sizes = joint.surfaces[1], (1e3 * joint.clearance, 1e3 * joint.radius)
-            text = f"{sizes[0]:g} mm is more than the {inner}'s radius, {sizes[1]:g} mm"
+        what, size = (
+            ("half height", 0.5 * joint.height) if isinstance(joint, ClearancePrismatic) else ("radius", joint.radius)
+        )
+        if joint.clearance > size:
+            text = f"{1e3 * joint.clearance:g} mm is more than the {joint.surfaces[1]}'s {what}, {1e3 * size:g} mm"
             yield warning(scene, f"joint.{name}.clearance", text, UNITS)
 
 
@@ -50,9 +53,9 @@ def _pins(scene: Scene) -> Iterator[InputError]:
     extents += [sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass) for body in bodies if body.mass]
     size = max([*extents, _extent(points)], default=0.0)
     for name, joint in scene.contacts().items():
-        for key in ("pin_radius", "ball_radius", "length") if size > 0.0 else ():
+        for key in ("pin_radius", "ball_radius", "length", "height", "width") if size > 0.0 else ():
             value = getattr(joint, key, None)
-            refused = joint.hollow and key != "length" and value is not None and value >= max(1.0, 15.0 * size)
+            refused = joint.hollow and key.endswith("radius") and value is not None and value >= max(1.0, 15.0 * size)
             if value is not None and value > LARGE * size and not refused:
                 text = f"{value:g} m is more than the size of the mechanism, {size:.3g} m"
                 yield warning(scene, f"joint.{name}.{key}", text, UNITS)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from flexclear.scene import provenance
-from flexclear.scene.clearance import CONTACTS, Clearance
+from flexclear.scene.clearance import CONTACTS, Clearance, Pair
 from flexclear.scene.drives import Drive
 from flexclear.scene.events import Event, require_possible
 from flexclear.scene.fields import Direction, Length, Number, Part, PartName, Positive, Time
@@ -307,7 +307,7 @@ class Scene(Part):
         known = self._driven_bodies()
         pairs = {n: [hosts[b] for b in pair] for n, pair in joints.items()}
         free = {n: [b for b in pair if b not in known] for n, pair in pairs.items()}
-        chosen = default_quantities(free if any(free.values()) else pairs, tuple([*self.contacts(), *self.stop_ends()]))
+        chosen = default_quantities(free if any(free.values()) else pairs, tuple([*self.pairs(), *self.stop_ends()]))
         return [parse(one.name, self.owners()) for one in chosen]
 
     def _driven_bodies(self) -> set[str]:
@@ -420,6 +420,11 @@ class Scene(Part):
     def contacts(self) -> dict[str, Clearance]:
         """Return the joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
+
+    def pairs(self) -> dict[str, Pair]:
+        """Return the pairs of features that may touch, by name in records: of the joint, if that has one pair only."""
+        pairs = ((name, pair) for name, joint in self.contacts().items() for pair in joint.pairs.items())
+        return {f"{name}.{own}" if own else name: pair for name, (own, pair) in pairs}
 
     def worn(self) -> dict[str, Clearance]:
         """Return the joints with clearance whose wear is computed, by name."""

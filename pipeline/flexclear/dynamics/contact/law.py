@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import NamedTuple
 
@@ -43,6 +43,17 @@ class Resolved:
     delivered: float | None
     warning: str | None = None
     deepest: float = inf
+
+    def shared(self, share: float) -> Resolved:
+        """Return the law of one of several contacts that have it together, each a share of its force.
+
+        An expression is the law of each contact.
+        """
+        if share == 1.0 or self.form not in FORMS:
+            return self
+        stiffness, exponent, damping, values = self.numbers
+        damped = damping * share if self.form == "linear-damper" else damping
+        return replace(self, numbers=Numbers(stiffness * share, exponent, damped, (values[0] * share, *values[1:])))
 
     def depth(self, force: float) -> float:
         """Return the penetration [m or rad] whose elastic force is `force` [N or N m], >= 0."""

@@ -78,8 +78,8 @@ def tilting(name: str, joint: Any, moment: float, force: float) -> str:
     return (
         f"{name}: it holds its pin parallel to the axis by {moment:.3g} N m on average, more than its contact, with "
         f"{force:.3g} N on a pin of {1e3 * joint.length:.4g} mm, can carry. With its clearance the pin would tilt, by "
-        f"up to {2.0 * joint.clearance / joint.length:.2g} rad; clearance-spherical joints, at both ends of a pin or "
-        "one for each of several hinges on an axis, let it"
+        f"up to {2.0 * joint.clearance / joint.length:.2g} rad: an axial_clearance lets it, as do clearance-spherical "
+        "joints, at both ends of a pin or one for each of several hinges on an axis"
     )
 
 

@@ -87,7 +87,7 @@ def most_parts(scene: Scene) -> Parts:
     chained = set(CHAIN) if paths or ideal - set(WHOLE) else set()
     return Parts(
         joints=tuple(sorted({"free", *ideal, *chained})),
-        surfaces=tuple(sorted({joint.type for joint in contacts.values()})),
+        surfaces=tuple(sorted({pair.contact.type for pair in scene.pairs().values()})),
         forms=FORMS if _touches(scene) else (),
         frictions=tuple(sorted({j.friction.kind for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),

@@ -32,13 +32,14 @@ def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray, known: Mapp
 
 def with_closed_contacts(scene: Scene, engine: Engine) -> Scene:
     """Return the scene with initial approach speeds for the contacts that are closed in an engine's work space."""
-    joints, stops = dict[str, Any](scene.joint), dict[str, Any](scene.stop)
+    joints, stops, closed = dict[str, Any](scene.joint), dict[str, Any](scene.stop), dict[str, dict[str, float]]()
     for c, contact in enumerate(engine.model.contacts):
         if engine.modes[c]:
-            parts, name = (joints, contact.name)
-            if isinstance(contact.joint, End):
-                parts, name = stops, contact.joint.stop
             speed = float(engine.latched[c])
-            given = {"initial_approach_speed": 0.0 if speed >= NO_IMPACT else speed}
-            parts[name] = parts[name].model_copy(update=given)
+            speed = 0.0 if speed >= NO_IMPACT else speed
+            if isinstance(contact.joint, End):
+                stops[contact.owner] = stops[contact.owner].model_copy(update={"initial_approach_speed": speed})
+            else:
+                closed.setdefault(contact.owner, {})[contact.name.partition(".")[2]] = speed
+    joints |= {name: joints[name].begun(speeds) for name, speeds in closed.items()}
     return scene.model_copy(update={"joint": joints, "stop": stops})

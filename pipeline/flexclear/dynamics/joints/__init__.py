@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from flexclear.dynamics.joints import free, rotation_vector, spherical, turn_and_slide, universal
 
-#: by type; prescribed paths alone create a joint that no scene can name, the rotation vector
+#: by type; no scene can name rotation vectors, of prescribed paths, and what holds a loose slider in a plane
 JOINTS = {
     "spherical": spherical,
     "revolute": turn_and_slide.REVOLUTE,
@@ -28,6 +28,7 @@ JOINTS = {
     "cylindrical": turn_and_slide.CYLINDRICAL,
     "slot": turn_and_slide.SLOT,
     "planar": turn_and_slide.PLANAR,
+    "guided": turn_and_slide.GUIDED,
     "fixed": turn_and_slide.FIXED,
     "free": free,
     "rotation-vector": rotation_vector,

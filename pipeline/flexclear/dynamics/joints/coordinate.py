@@ -70,13 +70,14 @@ class Coordinate:
         return np.roll(np.eye(3), self.axis + 1, axis=0)
 
 
-ROTATION = Coordinate("rotation", True)
+ROTATION, ROTATION_Y = Coordinate("rotation", True), Coordinate("rotation", True, axis=1, sine=(0, 2))
 TRANSLATION = Coordinate("translation", False)
 
 
-def angle_about_z(R: np.ndarray) -> float:
-    """Return the angle [rad] in (-pi, pi] of the rotation about z that equals R or is nearest to R."""
-    return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
+def angle_about(R: np.ndarray, axis: int = 2) -> float:
+    """Return the angle [rad] in (-pi, pi] of the rotation about an axis that equals R or is nearest to R."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    return float(np.arctan2(R[j, i] - R[i, j], R[i, i] + R[j, j]))
 
 
 def rates_are_speeds(count: int) -> Callable:

@@ -30,6 +30,7 @@ from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics.model.closing import displaced_poses, misfit
 from flexclear.dynamics.model.constraints import Constraint, constraints, coordinate_demands, demands
 from flexclear.dynamics.model.contacts import resolve_law
+from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record.motion import Motions
@@ -43,7 +44,7 @@ from flexclear.dynamics.record.wrenches import (
 )
 from flexclear.dynamics.run.run import Run
 from flexclear.numerics.rotations import cross, rotation_vector_to_matrix, skew
-from flexclear.scene.clearance import Clearance
+from flexclear.scene.clearance import Clearance, ClearancePrismatic, Pin
 from flexclear.scene.parts import RigidBody
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene
@@ -83,7 +84,9 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Ma
                     bound[q.name] = np.inf
                 continue
             for name in loose:
-                reach = lever.clearance(name, adjoint) * _separation(full.contacts()[name], load[name])
+                reach = lever.clearance(name, adjoint, full.contacts()[name]) * _separation(
+                    full.contacts()[name], load[name]
+                )
                 clearance[name][q.name] = max(clearance[name][q.name], reach)
     return clearance
 
@@ -96,7 +99,8 @@ def knows_all_joints(model: Model) -> bool:
 
 def _separation(joint: Clearance, force: float) -> float:
     """Return how far the points may separate [m]: the clearance, and the penetration under a force."""
-    law = resolve_law(joint, 1.0, "[normal]")  # the depth at rest does not depend on the mass
+    first = next(iter(joint.pairs.values())).contact
+    law = resolve_law(first, 1.0, "[normal]")  # the depth at rest does not depend on the mass
     # assumed force on a joint with clearance after separation, as a multiple of the ideal force
     return joint.clearance + law.depth(10.0 * force)
 
@@ -124,12 +128,25 @@ class OpeningMap:
         rows = self.gradient @ dual
         return -rows.T, float(np.abs(watched - (self.gradient.T @ rows).T).max(initial=0.0))
 
-    def clearance(self, name: str, rows: np.ndarray) -> float:
+    def clearance(self, name: str, rows: np.ndarray, joint: Clearance) -> float:
         """Return the largest motion that an adjoint solution gives per metre of separation of a joint's points."""
         constraint, range_of_rows, _ = self.joints[name]
-        count = {"revolute": 2, "slot": 1}.get(constraint.edge.kind, 3)
-        first = rows[:, range_of_rows][:, :count] / self.length
-        return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
+        count = {"revolute": 2, "cylindrical": 2, "slot": 1}.get(constraint.edge.kind, 3)
+        own = rows[:, range_of_rows]
+        if isinstance(joint, ClearancePrismatic):
+            # displacements along x and y, then turns about z, x and y; a slider that tilts is displaced that much less
+            arms = np.array([self.length, self.length, *(0.5 * size for size in joint.arms)])
+            x, y, about_z, about_x, about_y = np.linalg.norm(own[:, :5] / arms, axis=0)
+            wider = (joint.side_clearance or 0.0) / joint.clearance
+            return float(max(x, about_y, about_z if wider else 0.0) + wider * max(y, about_x))
+        first = own[:, :count] / self.length
+        loose = float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
+        if isinstance(joint, Pin) and joint.held is None:
+            turns = len(joint_type(constraint.edge.kind).TRANSLATIONS)  # first row of the tilt
+            tilt = np.linalg.svd(own[:, turns : turns + 2] * 2.0 / joint.length, compute_uv=False).max(initial=0.0)
+            axial = getattr(joint, "axial_clearance", 0.0) / joint.clearance
+            return max(loose, float(tilt)) + axial * float(np.linalg.norm(own[:, 2] / self.length))
+        return loose
 
 
 def opening_map(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> OpeningMap:

@@ -15,7 +15,7 @@ from flexclear.dynamics.routines.symbols import branch, cos, sin, sqrt
 #: squared angle [rad^2] below which functions of rotation vectors come from their series; the next terms are below
 #: rounding there
 SERIES_ANGLE = 1e-2
-TURN = "turn"
+TURN, TURN_Y = "turn", "turn about y"
 
 
 class Relative(NamedTuple):
@@ -41,6 +41,12 @@ def about_z(angle: Any) -> Matrix:
     return Matrix([c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0])
 
 
+def about_y(angle: Any) -> Matrix:
+    """Return the rotation about y by an angle [rad]."""
+    c, s = cos(angle), sin(angle)
+    return Matrix([c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c])
+
+
 def from_quaternion(q: Any) -> Matrix:
     """Return the rotation of a quaternion (w x y z) of any norm."""
     w, x, y, z = q
@@ -62,12 +68,13 @@ def quaternion_rate(q: Any, omega: Any) -> list[Any]:
 
 
 def along(*coordinates: int | str) -> Callable[[Any, Any], Relative]:
-    """Return the motion with these coordinates: slides along axes of F, and a turn about its z."""
-    S = [Twist(AXES[2], ZERO) if one == TURN else Twist(ZERO, AXES[int(one)]) for one in coordinates]
+    """Return the motion with these coordinates: slides along axes of F, and a turn about its z or y."""
+    turns = {TURN: AXES[2], TURN_Y: AXES[1]}
+    S = [Twist(turns[one], ZERO) if one in turns else Twist(ZERO, AXES[int(one)]) for one in coordinates]
 
     def motion(x: Any, u: Any) -> Relative:
         at = dict(zip(coordinates, x, strict=True))
-        R_FG = about_z(at[TURN]) if TURN in at else UNIT
+        R_FG = about_z(at[TURN]) if TURN in at else about_y(at[TURN_Y]) if TURN_Y in at else UNIT
         return Relative(R_FG, Vector([at.get(axis, 0.0) for axis in range(3)]), S)
 
     return motion
@@ -144,6 +151,7 @@ JOINTS = {
     "cylindrical": Joint(along(TURN, 2)),
     "slot": Joint(along(0, TURN)),
     "planar": Joint(along(0, 1, TURN)),
+    "guided": Joint(along(2, 0, TURN_Y)),
     "universal": Joint(by_two_turns),
     "spherical": Joint(by_quaternion, quaternion_rate, 1),
     "rotation-vector": Joint(by_rotation_vector),

@@ -10,9 +10,9 @@ from flexclear.dynamics.model.driving import joint_drives, named_coordinate
 from flexclear.dynamics.model.gears import coordinates_and_ratio, couplings
 from flexclear.dynamics.model.laws import NO_LAWS, drive_laws
 from flexclear.dynamics.model.loads import acting_frames, describe
-from flexclear.dynamics.model.mechanism import Contact, Mechanism
+from flexclear.dynamics.model.mechanism import Mechanism
 from flexclear.dynamics.model.start_table import given_coordinates
-from flexclear.dynamics.model.stops import ends
+from flexclear.dynamics.model.stops import End, ends
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.schema import Scene, Sections
 from flexclear.system.errors import InputError, errors_from
@@ -45,10 +45,9 @@ def mechanism_errors(scene: Scene, mechanism: Mechanism) -> list[InputError]:
 
     mechanism: may have ideal joints instead of the scene's joints with clearance.
     """
-    joints = [Contact(name, joint, *map(mechanism.site, joint.between)) for name, joint in scene.contacts().items()]
-    stops = [contact for contact in mechanism.contacts if contact.name not in scene.contacts()]
+    stops = [contact for contact in mechanism.contacts if isinstance(contact.joint, End)]
     loads = (partial(_frames, scene, mechanism, name) for name in scene.forces())
-    laws = (partial(contacts.resolve_one, mechanism, contact) for contact in (*joints, *stops))
+    laws = (partial(contacts.resolve_one, mechanism, one) for one in (*mechanism.touching(scene.pairs()), *stops))
     return errors_from((*laws, partial(couplings, mechanism), *loads))
 
 

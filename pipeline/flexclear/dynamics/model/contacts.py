@@ -74,7 +74,7 @@ def fill(
         bends = bristle(name, joint) is not None
         rows.append((*sites, *kinds_of, first if bends else -1))
         first += 3 * bends
-        sizes = (joint.clearance, joint.radius, _floor(joint, length))
+        sizes = (joint.clearance, joint.arm, _floor(joint, length))
         reals.append([*sizes, stick, *law.numbers[:3], *law.numbers.values, *numbers, *shape, length])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
@@ -147,10 +147,10 @@ def resolve_law(joint: Clearance | End, mass: float | None, path: str) -> Resolv
         law: Resolved = NORMAL_LAWS[normal.law](normal, stiffness, mass)
     except ValueError as error:
         raise InputError(path, str(error)) from None
-    if tight is None:
-        return law
-    numbers = law.numbers._replace(exponent=tight.exponent, values=(*tight.values, *law.numbers.values)[:12])
-    return replace(law, form=tight.form or law.form, numbers=numbers, deepest=tight.deepest)
+    if tight is not None:
+        numbers = law.numbers._replace(exponent=tight.exponent, values=(*tight.values, *law.numbers.values)[:12])
+        law = replace(law, form=tight.form or law.form, numbers=numbers, deepest=tight.deepest)
+    return law if isinstance(joint, End) else law.shared(joint.share)
 
 
 def _reduced_mass(masses: Sequence[float]) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -27,7 +27,7 @@ from flexclear.dynamics.model.merge import (
 from flexclear.dynamics.model.start_table import given_modes
 from flexclear.dynamics.model.stops import End, ends
 from flexclear.dynamics.model.tree import PATH, Branch, Edge, edges, span
-from flexclear.scene.clearance import Clearance
+from flexclear.scene.clearance import MIDDLE, Pair, Seat
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.parts import Ground
 from flexclear.scene.schema import Scene
@@ -71,13 +71,13 @@ class Closure(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """A clearance joint, or an end of a stop: its name, its part of the scene, and two sites.
+    """A pair of features of a clearance joint, or an end of a stop: its name, its surfaces and laws, and two sites.
 
     outer, inner: of the socket or journal, and of the ball or pin; of a stop, of the joint's first and second frame.
     """
 
     name: str
-    joint: Clearance | End
+    joint: Any
     outer: Site
     inner: Site
 
@@ -87,9 +87,14 @@ class Contact(NamedTuple):
         return f"{'stop' if isinstance(self.joint, End) else 'joint'} {self.name}"
 
     @property
+    def owner(self) -> str:
+        """Name of the joint or stop."""
+        return self.name.partition(".")[0]
+
+    @property
     def place(self) -> str:
-        """Key path of the contact in the scene."""
-        return f"stop.{self.joint.stop}" if isinstance(self.joint, End) else f"joint.{self.name}"
+        """Key path of the joint or stop in the scene."""
+        return f"{'stop' if isinstance(self.joint, End) else 'joint'}.{self.owner}"
 
 
 @dataclass(frozen=True)
@@ -214,6 +219,10 @@ class Mechanism:
         """Return the site at a named frame."""
         return _site(self.frames, self.links, self.link_of, frame)
 
+    def touching(self, pairs: Mapping[str, Pair]) -> list[Contact]:
+        """Return the contacts of pairs; raise InputError for a feature beside a frame of a flexible body."""
+        return _contacts(pairs, self.site)
+
 
 def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, int], name: str) -> Site:
     frame = find_frame(frames, name, "frame")
@@ -257,10 +266,30 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
         name: parts.lengths[parts.of(*_links_of(scene.joint[name], link_of))]
         for name in {stop.joint for stop in scene.stop.values()} & scene.joint.keys()
     }
-    touching: list[tuple[str, Clearance | End]] = [*scene.contacts().items(), *ends(scene, far)]
-    contacts = [Contact(n, j, at(j.between[0]), at(j.between[1])) for n, j in touching]
+    contacts = _contacts(scene.pairs(), at)
+    contacts += [Contact(name, end, at(end.between[0]), at(end.between[1])) for name, end in ends(scene, far)]
     deformation = {link_of[name]: q for name, q in given_modes(scene, bundles).items()}
     return Mechanism(scene, frames, links, link_of, closures, contacts, origin, length, parts, deformation=deformation)
+
+
+def _contacts(pairs: Mapping[str, Pair], at: Callable[[str], Site]) -> list[Contact]:
+    return [
+        Contact(name, pair.contact, *(_seated(name, at, *end) for end in pair.between)) for name, pair in pairs.items()
+    ]
+
+
+def _seated(name: str, at: Callable[[str], Site], frame: str, seat: Seat) -> Site:
+    """Return the site of a feature of a contact called `name`, at its seat in a frame."""
+    site = at(frame)
+    if seat == MIDDLE:
+        return site
+    if site.frame is not None:
+        raise InputError(
+            f"[joint.{name.partition('.')[0]}.between]",
+            f"'{frame}' is on a flexible body, and surfaces beside its frames are on rigid bodies only",
+            "fix a rigid body to the frame by a fixed joint, and name a frame of that",
+        )
+    return replace(site, placement=site.placement.of(Placement(np.array(seat.origin), np.array(seat.axes))))
 
 
 def _mass(scene: Scene, group: Group, bundles: Mapping[str, Labelled]) -> float:

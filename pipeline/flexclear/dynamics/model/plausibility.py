@@ -117,7 +117,7 @@ def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
         outer, inner = joint.surfaces
         problem = f"the {inner} starts with a penetration of {length(depth)} into the {outer}"
         remedy = f"lower the {outer}"
-    elif contact.name in replaceable_contacts(scene):
+    elif contact.owner in replaceable_contacts(scene):
         remedy = "start the joint as without clearance ([start] at = 'ideal'), " + remedy
     raise InputError(
         f"[{contact.place}]",

@@ -47,8 +47,10 @@ def refill_model(model: Model, scene: Scene) -> Model | None:
     """
     if not _same_structure(model, scene) or not _same_start(model, scene):
         return None
-    clearances = scene.contacts()
-    contacts = [c._replace(joint=clearances[c.name]) if c.name in clearances else c for c in model.contacts]
+    pairs, known = scene.pairs(), model.scene.pairs()
+    if [pair.between for pair in pairs.values()] != [pair.between for pair in known.values()]:
+        return None
+    contacts = [c._replace(joint=pairs[c.name].contact) if c.name in pairs else c for c in model.contacts]
     mechanism = replace(model.mechanism, contacts=contacts)
     weighed = _with_masses(mechanism, scene) if scene.body != model.scene.body else mechanism
     if weighed is None:

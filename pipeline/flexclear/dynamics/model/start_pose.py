@@ -147,7 +147,7 @@ def _data(scene: Scene, mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -
         "mode": [f"{name}.1" for name in drawn],
         "mode_body": ("mode", list(drawn)),
         "coordinate": list(joints),
-        "contact": list(scene.contacts()),
+        "contact": list(scene.pairs()),
     }
     parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     return xr.Dataset(data, coordinates, {"parameters": json.dumps(parameters, sort_keys=True)})

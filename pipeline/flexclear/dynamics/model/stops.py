@@ -33,6 +33,7 @@ class End:
     floor: float | None
     initial_approach_speed: float | None
     radius: float = 0.0
+    arm: float = 0.0
     friction: None = None
     type: str = "stop"
     hollow: bool = False

@@ -37,10 +37,11 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     """Return moments [N m] and forces [N] of several joints, as `joint_wrenches` does, (time, joint, 3) each."""
     model, seen = motions.model, motions.seen
     known = _tree(model, seen) | _closures(model, seen)
-    for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
-        moment, force = known.get(contact.name, (0.0, 0.0))  # constraints of a clearance joint beyond its contact
-        push = seen.touch["force"][:, c]
-        known[contact.name] = (moment + cross(seen.touch["point"][:, c], push), force + push)
+    for c, (name, pair) in enumerate(model.scene.pairs().items()):
+        owner = name.partition(".")[0]
+        moment, force = known.get(owner, (0.0, 0.0))  # constraints of a clearance joint beyond its contacts
+        push = -seen.touch["force"][:, c] if pair.swapped else seen.touch["force"][:, c]
+        known[owner] = (moment + cross(seen.touch["point"][:, c], push), force + push)
     if any(name not in known for name in names):
         known |= _inside_groups(motions, known)
     moments, forces = (np.empty((len(seen.state), len(names), 3)) for _ in range(2))

@@ -8,7 +8,7 @@ has no ideal counterpart: it, and the bodies that touch it, stay where the poses
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.driving import label
+from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.start_table import Given, given_coordinates
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.record.wrenches import joint_wrenches
@@ -26,6 +27,7 @@ from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start, per_speed, project
 from flexclear.dynamics.run.run import maker
 from flexclear.dynamics.starts.snapshot import with_held_drives, with_poses_and_velocities, with_resting_contacts
+from flexclear.scene.clearance import Crown, Rim, Seat
 from flexclear.scene.laws import Polynomial
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
@@ -38,6 +40,8 @@ from flexclear.system.progress import Progress
 REACHED, PIN_PASSES = 1e-9, 20
 #: singular values below this fraction of the largest are rounding
 SINGULAR_ROUNDING = 1e-9
+#: moments and forces of joints, by name
+Forces = Mapping[str, tuple[np.ndarray, np.ndarray]]
 
 
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
@@ -84,7 +88,7 @@ def _exact_drives(scene: Scene, pins: Container[str], engine: Engine, y: np.ndar
 
 
 def _pressed(
-    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, forces: Mapping[str, np.ndarray]
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, forces: Forces
 ) -> tuple[Engine, np.ndarray]:
     engine, y = _start_ideal(scene, bundles, progress)
     return engine, _press_pins(engine, y, forces)
@@ -156,23 +160,62 @@ def _modal_speeds(engine: Engine) -> list[int]:
     return [model.nq + k for own in model.numbering.modal_coordinates.values() for k in own]
 
 
-def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the force of every joint on its second body at the start [N], world axes, by name."""
+def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> Forces:
+    """Return moment [N m] and force [N] of every joint on its second body at the start, world axes, by name."""
     seen = observe(engine, rows_of(engine, y[None], engine.start), after=True)
-    return {name: wrench[1][0] for name, wrench in joint_wrenches(Motions(engine.model, seen)).items()}
+    return {name: (n[0], f[0]) for name, (n, f) in joint_wrenches(Motions(engine.model, seen)).items()}
 
 
-def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) -> np.ndarray:
+def _loads(engine: Engine, forces: Forces) -> Iterator[tuple[int, np.ndarray | float]]:
+    """Yield each contact of a joint without clearance in the ideal mechanism, by number, with the load on it [N].
+
+    It is the force on the inner part of a pin, whole or at one of its ends, and the size of that on a collar or corner.
+    Of a slider in a plane the corners at both ends that force and moment of the joint press are yielded; a slider that
+    is loose across its width begins in the middle.
+    """
+    frames, table = engine.table(m.SITE_FRAMES), engine.model.arrays.table(m.CONTACTS)
+    loose = replaceable_contacts(engine.model.scene)
+    for c, (name, pair) in enumerate(engine.model.scene.pairs().items()):
+        owner = name.partition(".")[0]
+        if owner not in loose:
+            continue
+        moment, force = forces[owner]
+        sides = ("inner", "outer") if pair.swapped else ("outer", "inner")
+        first, second = (_joint_frame(frames[table[c][side]], getattr(pair, side)) for side in sides)
+        x, y, z = first.R.T
+        along = float(z @ (second.p - first.p))
+        if name in loose:
+            yield c, force
+        elif isinstance(pair.contact, Rim):
+            end = pair.inner.origin[2]
+            tilting = np.cross(moment, z) + (along + end) * force
+            yield c, -(tilting - z * (z @ tilting)) / (2.0 * end)
+        elif isinstance(pair.contact, Crown):
+            pressing = float(z @ force) * np.sign(pair.inner.origin[2])
+            yield from ((c, pressing) for _ in range(pressing > 0.0))
+        elif loose[owner].held is not None:
+            arm, push = pair.inner.origin[2], float(x @ force)
+            slid = along if pair.swapped else 0.0
+            load = 0.5 * (push + (float(y @ moment) + slid * push) / arm)
+            yield from ((c, abs(load)) for _ in range(load * pair.inner.origin[0] < 0.0))
+
+
+def _joint_frame(site: np.void, seat: Seat) -> Placement:
+    """Return the frame of a joint in which a site has its seat."""
+    axes = site["axes"] @ np.array(seat.axes).T
+    return Placement(site["origin"] - axes @ np.array(seat.origin), axes)
+
+
+def _press_pins(engine: Engine, y: np.ndarray, forces: Forces) -> np.ndarray:
     """Return the nearest state in which every pin is where the force on it presses it."""
     model, table = engine.model, engine.model.arrays.table(m.CONTACTS)
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
+    closure_rows.evaluate(engine, y, engine.start)
     # the end of a stop may move, too: held fixed, it would hold the pins back
-    pins = [
-        pin
-        for pin in zip(table, model.contacts, model.laws, strict=True)
-        if pin[1].name in replaceable_contacts(model.scene)
-    ]
-    modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, _ in pins)
+    pins = [(table[c], model.contacts[c], model.laws[c], load) for c, load in _loads(engine, forces)]
+    if not pins:
+        return y
+    modal, least = y[_modes(engine)], min(contact.joint.clearance for _, contact, *_ in pins)
 
     def along(row: np.void, joint: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the axes that hold a pin, its offset [m], and the rate of that [m/s] along the axes."""
@@ -183,9 +226,12 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
     for _ in range(PIN_PASSES):
         closure_rows.evaluate(engine, y, engine.start)
         missing = []
-        for row, contact, law in pins:
+        for row, contact, law, load in pins:
             across, offset, _ = along(row, contact.joint)
-            force = across @ forces[contact.name]
+            if isinstance(load, float):
+                missing.append(contact.joint.radius - law.depth(load) - offset)
+                continue
+            force = across @ load
             size = float(np.linalg.norm(force))
             pressed = contact.joint.clearance + law.depth(size)
             # forces below this fraction of the weight press nothing: the pin stays in the middle
@@ -195,7 +241,7 @@ def _press_pins(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray])
         if np.max(np.abs(offsets)) <= REACHED * least:
             return y
         engine.select_pieces_after(engine.start)
-        rates = per_speed(engine, y, lambda _: np.concatenate([along(row, one.joint)[2] for row, one, _ in pins]))
+        rates = per_speed(engine, y, lambda _: np.concatenate([along(row, one.joint)[2] for row, one, *_ in pins]))
         y = _move_pins(engine, y, rates, offsets, modal)
     raise SolverError(
         f"at t = {engine.start:.6g} s: the pins cannot reach their pressed positions; give "

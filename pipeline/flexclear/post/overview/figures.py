@@ -211,7 +211,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         closed = "" if "hardly" in count else f", {fraction:.0%} of the time in contact"
         text = f"{count}, peak {in_unit(peak, unit)}{closed}"
         row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
-    kinds = dict.fromkeys("joints with clearance" if names[k] in joints else "stops" for k in chosen)
+    kinds = dict.fromkeys("joints with clearance" if names[k].partition(".")[0] in joints else "stops" for k in chosen)
     style.heading(figure, f"{' and '.join(kinds).capitalize()}{_shown_count_text(len(names), CONTACTS)}")
     return style.files("contacts", figure)
 

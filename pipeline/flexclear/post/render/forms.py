@@ -33,8 +33,17 @@ SLENDER = 2.5
 #: largest half extent of a body without separate joints, as a fraction of the mechanism's size
 LARGEST = 0.1
 #: joints that turn about z of their frames, and that slide along it
-TURNING = ("revolute", "slot", "planar", *(name for name, kind in SURFACES.items() if kind.held == "planar"))
-SLIDING = ("prismatic", "cylindrical")
+TURNING = (
+    "revolute",
+    "slot",
+    "planar",
+    *(name for name, kind in SURFACES.items() if kind.ideal in ("revolute", "slot")),
+)
+SLIDING = (
+    "prismatic",
+    "cylindrical",
+    *(name for name, kind in SURFACES.items() if kind.ideal in ("prismatic", "cylindrical")),
+)
 BALLS = ("spherical", *(name for name, kind in SURFACES.items() if kind.ideal == "spherical" or not kind.hollow))
 #: frames on a body at which a load acts, and at which nothing does
 LOADED, BARE = "load", "frame"

@@ -246,7 +246,8 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
     contacts = names(at.run, "contact")
     for name, joint in at.given.get("joint", {}).items():
         kind, (first, second) = joint["type"], joint["between"]
-        contact = contacts.index(name) if name in contacts else None
+        own = [k for k, one in enumerate(contacts) if kind in SURFACES and one.partition(".")[0] == name]
+        contact = own[0] if own else None
         color = JOINT_COLOR if contact is None else CLEARANCE_COLOR
         grounded = at.owner(first) is None
         if kind in forms.BALLS:
@@ -256,7 +257,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
                 yield at.part_at_frame(first, _floor(at, joint, size), GROUND_COLOR)
             else:
                 yield at.part_at_frame(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
-        elif "revolute" in kind or "slot" in kind:
+        elif "revolute" in kind or "slot" in kind or kind == "clearance-cylindrical":
             radius = float(joint.get("pin_radius", PIN * size))
             long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # the links would hide shorter ones
             yield at.part_at_frame(second, surfaces.cylinder(radius, long), color, contact)
@@ -271,6 +272,10 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
                 )
             elif grounded:
                 yield at.part_at_frame(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
+        elif kind == "clearance-prismatic":
+            size_of_slider = joint["height"], joint.get("width", joint["height"]), joint["length"]
+            yield at.part_at_frame(second, surfaces.box(size_of_slider), color, contact)
+            yield at.part_at_frame(first, _guide(at, joint, size_of_slider), SOCKET_COLOR, opacity=0.35)
         elif kind in forms.SLIDING:
             low, high = travel(at.run, name)
             rail = surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size)
@@ -284,16 +289,35 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
             yield at.part_at_frame(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
 
 
+def _path(at: Layout, joint: Mapping[str, Any]) -> np.ndarray:
+    """Return the places of a joint's second frame in its first, (time, 3); one, its origin, where that moves itself."""
+    first, second = joint["between"]
+    if at.owner(first) is not None or second not in at.frames:
+        return np.zeros((1, 3))
+    origin, axes = at.local(first)
+    return np.asarray((at.run.frame_position.values[:, at.frames.index(second)] - origin) @ axes)
+
+
+def _guide(at: Layout, joint: Mapping[str, Any], slider: Sequence[float]) -> Surface:
+    """Return the faces of a guide, as far as its slider goes or as long as it is."""
+    path, (height, width, length) = _path(at, joint)[:, 2], slider
+    low, high = path.min() - 0.5 * length, path.max() + 0.5 * length
+    if "guide_length" in joint:
+        low, high = -0.5 * joint["guide_length"], 0.5 * joint["guide_length"]
+    thick, plates = 0.1 * height, list[Surface]()
+    for axis, size, gap in ((0, height, joint["clearance"]), (1, width, joint.get("side_clearance"))):
+        across = [width, height][axis] + 2.0 * thick
+        box = surfaces.box((thick, across, high - low) if axis == 0 else (across, thick, high - low))
+        for side in (1.0, -1.0) if gap is not None else ():
+            plates.append(surfaces.place(box, np.eye(3)[axis] * side * (0.5 * (size + thick) + gap)))
+    return surfaces.place(surfaces.join(plates), np.array([0.0, 0.0, 0.5 * (low + high)]))
+
+
 def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
     """Return an unlimited plane as far as its ball goes; around the frame's origin where the plane itself moves."""
-    first, second = joint["between"]
-    low = high = np.zeros(2)
-    reach = 0.25 * size
-    if at.owner(first) is None and second in at.frames:
-        origin, axes = at.local(first)
-        path = (at.run.frame_position.values[:, at.frames.index(second)] - origin) @ axes
-        low, high = path.min(axis=0)[:2], path.max(axis=0)[:2]
-        reach = 2.5 * float(joint["ball_radius"])
+    first, path = joint["between"][0], _path(at, joint)
+    low, high = path.min(axis=0)[:2], path.max(axis=0)[:2]
+    reach = 2.5 * float(joint["ball_radius"]) if len(path) > 1 or at.owner(first) is None else 0.25 * size
     plane = surfaces.box((*(high - low + 2.0 * reach), 0.004 * size))
     return surfaces.place(plane, np.array([*(0.5 * (low + high)), -0.002 * size]))
 

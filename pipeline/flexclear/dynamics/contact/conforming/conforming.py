@@ -42,4 +42,4 @@ def logarithmic(joint: Any, argument: float, constant: float) -> Conforming:
     """Return the force of delta = F/(pi E* L) [ln(argument/F) + constant]; argument [N]."""
     force = argument * exp(constant) / e  # where the formula ends
     deepest = force * compliance(joint) / joint.length
-    return Conforming("logarithmic", (deepest, force), deepest=LIMIT_DEPTH * deepest)
+    return Conforming("logarithmic", (force, deepest), deepest=LIMIT_DEPTH * deepest)

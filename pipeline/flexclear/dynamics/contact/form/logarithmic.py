@@ -35,13 +35,13 @@ def exponent(ratio):
 
 @kernel
 def elastic(depth, law):
-    """Return the elastic force [N]; the law's values are the largest compression [m] and the force there [N]."""
+    """Return the elastic force [N]; the law's values are a force [N], and the largest compression, at that force [m]."""
     if depth <= 0.0:
         return 0.0
-    ratio = depth / law.values[0]
+    ratio = depth / law.values[1]
     if ratio > LIMIT_DEPTH:
-        return law.values[1] * (0.5 + (ratio - LIMIT_DEPTH) / LIMIT)
-    return law.values[1] * np.exp(-exponent(ratio))
+        return law.values[0] * (0.5 + (ratio - LIMIT_DEPTH) / LIMIT)
+    return law.values[0] * np.exp(-exponent(ratio))
 
 
 force = damped(elastic)
@@ -50,14 +50,14 @@ force = damped(elastic)
 @kernel
 def stored(depth, law):
     """Return the stored energy [J]."""
-    ratio = min(depth / law.values[0], LIMIT_DEPTH)
-    y, over = elastic(ratio * law.values[0], law) / law.values[1], depth / law.values[0] - ratio
-    return law.values[0] * law.values[1] * (0.5 * y * ratio - 0.25 * y * y + over * (0.5 + 0.5 * over / LIMIT))
+    ratio = min(depth / law.values[1], LIMIT_DEPTH)
+    y, over = elastic(ratio * law.values[1], law) / law.values[0], depth / law.values[1] - ratio
+    return law.values[1] * law.values[0] * (0.5 * y * ratio - 0.25 * y * y + over * (0.5 + 0.5 * over / LIMIT))
 
 
 def depth(force: float, law: Numbers) -> float:
     """Return the depth [m] at which the elastic force is `force` [N]."""
-    y = force / law.values[1]
+    y = force / law.values[0]
     if y > 0.5:
-        return float(law.values[0] * (LIMIT_DEPTH + (y - 0.5) * LIMIT))
-    return float(law.values[0] * y * (1.0 - np.log(y))) if y > 0.0 else 0.0
+        return float(law.values[1] * (LIMIT_DEPTH + (y - 0.5) * LIMIT))
+    return float(law.values[1] * y * (1.0 - np.log(y))) if y > 0.0 else 0.0
