@@ -78,7 +78,7 @@ def test_a_logarithmic_force_solves_its_formula_to_rounding(form: str, clearance
         assert compression(form, found, clearance) == pytest.approx(depth, rel=1e-12)
         assert law.depth(found) == pytest.approx(depth, rel=1e-12)
         # the root of the formula below its largest compression, by another method
-        top = law.numbers.values[1]
+        top = law.numbers.values[0]
         other = brentq(
             lambda F, d=depth: compression(form, F, clearance) - d, 1e-14 * top, top, xtol=1e-300, rtol=1e-14
         )
@@ -88,7 +88,7 @@ def test_a_logarithmic_force_solves_its_formula_to_rounding(form: str, clearance
 @pytest.mark.parametrize("form", LOGARITHMIC)
 def test_a_logarithmic_force_goes_on_along_its_tangent(form: str) -> None:
     law = resolved(form)
-    assert law.deepest == pytest.approx(LIMIT_DEPTH * law.numbers.values[0])
+    assert law.deepest == pytest.approx(LIMIT_DEPTH * law.numbers.values[1])
     slopes = [(force(law, law.deepest * (1.0 + s)) - force(law, law.deepest)) / s for s in (-1e-6, 1e-6, 1.0)]
     assert slopes == pytest.approx(slopes[2:] * 3, rel=1e-5)  # from below by the formula, whose curvature is 1e-6
     assert law.depth(force(law, 3.0 * law.deepest)) == pytest.approx(3.0 * law.deepest, rel=1e-13)

@@ -98,7 +98,7 @@ def encode_with_digest(table: Mapping[str, Any]) -> bytes:
 
 
 def read_checked(path: Path) -> dict[str, Any] | None:
-    """Return the table in a file of `encode_with_digest`; None without such a file, and where a bit of it has changed."""
+    """Return the table in a file of `encode_with_digest`; None without the file, or where a bit of it changed."""
     try:
         whole = json.loads(read_whole(path, LARGEST_TABLE))
         table = whole["content"]

@@ -35,7 +35,7 @@ def exponent(ratio):
 
 @kernel
 def elastic(depth, law):
-    """Return the elastic force [N]; the law's values are a force [N], and the largest compression, at that force [m]."""
+    """Return the elastic force [N]; values: a force [N], and the largest compression [m], which is there."""
     if depth <= 0.0:
         return 0.0
     ratio = depth / law.values[1]
