@@ -551,7 +551,7 @@ class _Several(_Contact):
         return self
 
 
-class _Tilting(Pin, _Several):
+class _Tilting(_Several, Pin):
     """Keys of pins that may tilt in their journal."""
 
     surfaces = ("journal", "pin")
@@ -658,7 +658,7 @@ class BallOnPlane(_Ball):
         return self.ball_radius
 
 
-class ClearancePrismatic(_Clearance, _Several):
+class ClearancePrismatic(_Several, _Clearance):
     """Rectangular slider in a guide with clearance; between = [guide frame, slider frame], each in the middle.
 
     It slides along z of the guide's frame. Without `width` it also moves across its height, along x, and turns about y,

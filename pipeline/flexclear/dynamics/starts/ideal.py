@@ -191,13 +191,15 @@ def _loads(engine: Engine, forces: Forces) -> Iterator[tuple[int, np.ndarray | f
             tilting = np.cross(moment, z) + (along + end) * force
             yield c, -(tilting - z * (z @ tilting)) / (2.0 * end)
         elif isinstance(pair.contact, Crown):
-            pressing = float(z @ force) * np.sign(pair.inner.origin[2])
-            yield from ((c, pressing) for _ in range(pressing > 0.0))
+            pressing = float(z @ force) * float(np.sign(pair.inner.origin[2]))
+            if pressing > 0.0:
+                yield c, pressing
         elif loose[owner].held is not None:
             arm, push = pair.inner.origin[2], float(x @ force)
             slid = along if pair.swapped else 0.0
             load = 0.5 * (push + (float(y @ moment) + slid * push) / arm)
-            yield from ((c, abs(load)) for _ in range(load * pair.inner.origin[0] < 0.0))
+            if load * pair.inner.origin[0] < 0.0:
+                yield c, abs(load)
 
 
 def _joint_frame(site: np.void, seat: Seat) -> Placement:
