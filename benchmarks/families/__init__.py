@@ -23,4 +23,5 @@ NAMES = {
     "effects": "effects:FAMILY",
     "turning": "turning:FAMILY",
     "robots": "robots:FAMILY",
+    "tight-fits": "tight_fits:FAMILY",
 }

@@ -194,14 +194,14 @@ def test_a_contact_too_wide_for_hertz_is_told_the_form_that_holds() -> None:
         joint("liu").model_dump(mode="json", exclude_none=True) | {"normal": {"law": "hertz"}}
     )
     law = resolve_law(one, 1.0, "")
-    for depth, form in ((3e-5, "johnson"), (2e-4, "esdu-78035"), (4e-4, "liu")):
+    for depth, form in ((3e-5, "johnson"), (2e-4, "pereira")):
         found = warnings("joint J", one, law, depth, 1e6)
         assert "Hertz" in found[0]
         assert f"normal.form = '{form}'" in found[0]
     assert not warnings("joint J", joint("johnson"), resolved("johnson"), 3e-5, 1e6)
     (beyond,) = warnings("joint J", joint("johnson"), resolved("johnson"), 6e-5, 1e6)
     assert "form 'johnson' holds to 4.58e-05 m" in beyond
-    assert "normal.form = 'esdu-78035'" in beyond
+    assert "normal.form = 'pereira'" in beyond
 
 
 @pytest.mark.parametrize(

@@ -274,4 +274,4 @@ def test_scenes_place_their_expressions_errors() -> None:
         load_scene(TREE / "scenes/checks/stops.toml", {"stop.C.normal": normal | {"values": {"K": "1e6 N/m"}}})
     bearing = {"law": "expression", "coefficient": "tanh(slip/1 m/s)*1 N/(1 N + normal_force)", "radius": "1 mm"}
     with pytest.raises(InputError, match="slip alone: its coefficient has no normal_force"):
-        load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml", {"joint.main.friction": bearing})
+        load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml", {"joint.A.friction": bearing})

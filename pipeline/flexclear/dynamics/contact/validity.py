@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 SMALL_CONTACT = 0.3
 #: penetration, as a fraction of the inner radius, above which no contact law holds
 SHALLOW = 0.1
-#: penetrations over the clearance up to which these forms hold
-JOHNSON, ESDU = 4.0 * LIMIT_DEPTH / e**2, 4.0 * LIMIT_DEPTH
+#: penetration over the clearance up to which the form 'johnson' holds
+JOHNSON = 4.0 * LIMIT_DEPTH / e**2
 #: moments below this fraction of the weight times the size of a mechanism tilt no pin
 NO_MOMENT = 1e-6
 
@@ -63,7 +63,7 @@ def _instead(joint: Any, depth: float) -> str:
         return "; for a lined socket normal.form = 'winkler' holds"
     if joint.type != "clearance-revolute" or joint.normal.needs_materials is False:
         return ""
-    form = "johnson" if depth < JOHNSON * joint.clearance else "esdu-78035" if depth < ESDU * joint.clearance else "liu"
+    form = "johnson" if depth < JOHNSON * joint.clearance else "pereira"
     return f"; of a tight fit, normal.form = '{form}' does"
 
 
