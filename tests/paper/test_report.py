@@ -95,7 +95,8 @@ def test_paper_page_names_its_tables_and_every_figure_with_its_scenes(content):
 
 def test_every_note_on_the_paper_s_tables_is_listed_once(content):
     listed = [note for _, note in report.paper_lists(content)["notes"].rows]
-    assert set(listed) == {note for name in ("table08", "table10") for note in content.tables[name].notes}
+    every = {note for name in ("table08", "table10") for note in content.tables[name].notes}
+    assert set(listed) == {note for note in every if not note.startswith("What could not be")}
     assert len(listed) == len(set(listed)) > report.NOTES
 
 
