@@ -17,7 +17,7 @@ from flexclear.commands.check import examine
 from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.scene import lines
 from flexclear.scene.json_schema import scene_schema
-from flexclear.scene.plausibility import implausible
+from flexclear.scene.plausibility import implausible_values
 from flexclear.scene.schema import Scene
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
@@ -187,7 +187,7 @@ def test_a_disc_is_larger_than_the_distances_of_its_frames_and_denser_than_air(s
     moments = [k * 10.0 * square_radius for k in (0.5, 0.5, 1.0)]
     bodies = {"ground": ground(axle=(0, 0, 0)), "disc": rigid(10.0, moments, {"centre": frame((1e-3, 0.0, 0.0))})}
     table = mechanisms.scene(bodies, {"axle": joint("revolute", "ground.axle", "disc.centre")}, end=1.0)
-    assert bool(implausible(Scene.model_validate(table))) == warned
+    assert bool(implausible_values(Scene.model_validate(table))) == warned
 
 
 def test_the_schema_refuses_what_is_no_scene(validators):

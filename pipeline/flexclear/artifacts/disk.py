@@ -98,7 +98,7 @@ def encode_with_digest(table: Mapping[str, Any]) -> bytes:
 
 
 def read_checked(path: Path) -> dict[str, Any] | None:
-    """Return the table in a file of `encode_with_digest`; None without such a file, and where a bit of it has changed."""
+    """Return the table in a file of `encode_with_digest`; None without such a file, or where a bit has changed."""
     try:
         whole = json.loads(read_whole(path, LARGEST_TABLE))
         table = whole["content"]
@@ -215,7 +215,7 @@ def sweep(root: Path) -> int:
             if not name.endswith((".tmp", ".part", ".lock")):
                 continue
             path = Path(folder, name)
-            if (name.endswith(".tmp") and _is_abandoned(path)) or (name.endswith(".part") and _old(path)):
+            if (name.endswith(".tmp") and _is_abandoned(path)) or (name.endswith(".part") and _is_old(path)):
                 with contextlib.suppress(OSError):  # the folder is read-only, or another process removes the file
                     path.unlink()
                     removed += 1
@@ -230,11 +230,11 @@ def _is_abandoned(path: Path) -> bool:
     if match is None:
         return False  # not a file of this program
     if match["host"] != _host():
-        return _old(path)
+        return _is_old(path)
     return not platforms.alive(int(match["pid"]))
 
 
-def _old(path: Path) -> bool:
+def _is_old(path: Path) -> bool:
     with contextlib.suppress(OSError):
         return time.time() - path.stat().st_mtime > ABANDONED_AFTER
     return False

@@ -38,10 +38,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Run the requested action."""
-    {"size": _size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
+    {"size": _print_size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
 
 
-def _size(options: argparse.Namespace) -> None:
+def _print_size(options: argparse.Namespace) -> None:
     store = open_workplace().store
     inventory = maintenance.inventory(store, whole=False)
     sizes: dict[str, list[int]] = {}

@@ -19,7 +19,7 @@ from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.numbering import Numbering
 from flexclear.dynamics.model.stops import End, ends_an_angle
 from flexclear.scene.clearance import Clearance
-from flexclear.system.errors import InputError, together
+from flexclear.system.errors import InputError, all_or_errors
 
 if TYPE_CHECKING:
     from flexclear.dynamics.contact.law import Resolved
@@ -33,7 +33,7 @@ SitePairs = Sequence[tuple[int, int]]
 
 def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
     """Return the normal law of each contact with its numbers; raise InputError for a law with impossible values."""
-    return tuple(together(partial(resolve_one, mechanism, contact) for contact in mechanism.contacts))
+    return tuple(all_or_errors(partial(resolve_one, mechanism, contact) for contact in mechanism.contacts))
 
 
 def fill(

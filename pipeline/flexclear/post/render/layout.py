@@ -156,7 +156,7 @@ def _carrier(run: xr.Dataset, owner: int | None, frame: int | None, step: int) -
     return matrix
 
 
-def travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
+def travel_range(run: xr.Dataset, joint: str) -> tuple[float, float]:
     """Return least and largest displacement along a joint's axis [m], that of the assembled start included."""
     for name in (joint, f"{joint}.translation"):
         if "coordinate" in run.coords and name in run.coordinate.values:
