@@ -119,7 +119,7 @@ def test_nothing_that_the_project_ships_is_doubted(path: Path, validators):
 def test_a_value_of_the_command_line_is_doubted_where_it_is_given(
     verb: str, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch, fresh: Path
 ):
-    monkeypatch.setattr(show, "shown", lambda scene, quiet: ([], None))  # nothing is drawn
+    monkeypatch.setattr(show, "show_start", lambda scene, quiet: ([], None))  # nothing is drawn
     scene, _ = write("slider-crank", tmp_path)
     said = command(verb, scene, "--set", "joint.pin.clearance=0.2").err
     assert "warning: --set joint.pin.clearance: 200 mm is more than the pin's radius, 10 mm" in said

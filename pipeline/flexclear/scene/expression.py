@@ -92,8 +92,8 @@ def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) ->
     if exponents is not None and not _same_units(exponents, needed):
         turned = "; rad is a unit: divide by 1 rad" if _same_units((*exponents[:3], 0.0), needed) else ""
         raise ValueError(
-            f"its value is in {units.si(exponents)}, but {units.with_article(dimension)} [{units.si(needed)}] is expected"
-            f"{turned}"
+            f"its value is in {units.si(exponents)}, but {units.with_article(dimension)} [{units.si(needed)}] is "
+            f"expected{turned}"
         )
 
 
