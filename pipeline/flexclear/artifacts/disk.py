@@ -1,6 +1,6 @@
 """Atomically written files with their own digests, copies for display, locks, and the removal of leftovers.
 
-Temporary files and locks of a process that died stay on disk, whatever ended it; `sweep` recognises temporary files by
+Temporary files and locks of a process that died stay on disk, whatever ended it; `remove_leftovers` recognises temporary files by
 the name of their owner, and locks by nobody holding them.
 """
 
@@ -142,7 +142,9 @@ def temporary(path: Path) -> Iterator[Path]:
     try:
         yield scratch
     finally:
-        with contextlib.suppress(PermissionError):  # on Windows, open in a library that failed: `sweep` removes it
+        with contextlib.suppress(
+            PermissionError
+        ):  # on Windows, open in a library that failed: `remove_leftovers` removes it
             platforms.remove(scratch)
 
 
@@ -206,7 +208,7 @@ def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
     return lock
 
 
-def sweep(root: Path) -> int:
+def remove_leftovers(root: Path) -> int:
     """Remove temporary files and locks of ended processes below `root`, and unfinished work that nobody has continued
     for long; return the number of removed files."""
     removed = 0

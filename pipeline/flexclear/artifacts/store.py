@@ -26,9 +26,9 @@ from flexclear.artifacts.disk import (
     publish,
     read_checked,
     read_whole,
+    remove_leftovers,
     settle,
     sha256,
-    sweep,
     temporary,
 )
 from flexclear.system import platforms
@@ -268,9 +268,9 @@ class Store:
                 leftover.unlink(missing_ok=True)
             yield
 
-    def sweep(self) -> None:
+    def remove_leftovers(self) -> None:
         """Remove the temporary files and locks that killed processes left anywhere."""
-        sweep(self.root)
+        remove_leftovers(self.root)
 
     def below(self, path: Path) -> str:
         """Return a path in the form in which messages name it."""

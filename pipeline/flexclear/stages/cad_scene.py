@@ -37,7 +37,7 @@ def files(source: Path, folder: Path) -> tuple[dict[str, bytes], list[str]]:
     joined = {place for pair in joints for place, _ in pair}
     for name, mine in frames.items():  # of shafts only those in a joint: bosses and fillets are shafts, too
         frames[name] = {k: one for k, one in mine.items() if one.hole or f"{name}.{k}" in joined}
-    made = {f"{_word(source.stem) or 'part'}.toml": _scene(source, names, found, joints, frames).encode()}
+    made = {f"{_identifier(source.stem) or 'part'}.toml": _scene(source, names, found, joints, frames).encode()}
     path = Path(os.path.relpath(source.resolve(), folder.resolve())).as_posix()
     for k, (name, solid) in enumerate(zip(names, found, strict=True), start=1):
         made[f"{name}_mesh.toml"] = _recipe(path, k, solid, frames[name]).encode()
@@ -45,7 +45,7 @@ def files(source: Path, folder: Path) -> tuple[dict[str, bytes], list[str]]:
     return made, [f"{name} has no cylindrical hole or shaft: give it frames" for name in lonely]
 
 
-def _word(text: str) -> str:
+def _identifier(text: str) -> str:
     return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
 
 
@@ -53,7 +53,7 @@ def _names(given: list[str]) -> Iterator[str]:
     """Yield a name for each solid: that of its product, or part1, part2, ...; numbered where products are alike."""
     taken = {"ground"}
     for k, text in enumerate(given, start=1):
-        word = _word(text.rpartition("/")[2])
+        word = _identifier(text.rpartition("/")[2])
         word = f"part{k}" if not word or word.startswith("open_cascade") or word[0].isdigit() else word
         name = f"{word}_{k}" if word in taken else word
         taken.add(name)

@@ -12,7 +12,7 @@ from flexclear.artifacts.quantities import SEPARATED
 from flexclear.post.cost.study import methods
 from flexclear.post.overview.curves import size_of
 from flexclear.post.plotting import style
-from flexclear.post.single_run.series import sentence
+from flexclear.post.single_run.series import horizon_sentence
 from flexclear.scene import integrators
 
 #: largest error of the energy balance, as a fraction of the largest change of any energy
@@ -173,7 +173,7 @@ def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -
         else "Not in all checks: " + "; ".join(f"{c.name} ({c.value}, limit {c.limit}): {c.remedy}" for c in bad) + "."
     )
     if "horizon" in run:
-        text += " " + sentence(float(run["horizon"]), float(run["time"][-1]), members)
+        text += " " + horizon_sentence(float(run["horizon"]), float(run["time"][-1]), members)
     return text
 
 

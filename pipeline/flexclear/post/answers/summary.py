@@ -15,7 +15,7 @@ from flexclear.post.answers.effect_ranking import in_words
 from flexclear.post.answers.effect_sizes import staying_contacts_sentence
 from flexclear.post.answers.stability import ENERGY, lost_energy
 from flexclear.post.overview.curves import impacts, in_unit
-from flexclear.post.single_run.series import parameters, sentence
+from flexclear.post.single_run.series import horizon_sentence, parameters
 from flexclear.scene.clearance import SURFACES
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import contacts_that_stay
@@ -92,7 +92,7 @@ def _horizon_lines(run: xr.Dataset, members: float | None) -> list[str]:
         if min(horizon, end if members is None else members) < end
         else ""
     )
-    return [html.escape(sentence(horizon, end, members)) + later]
+    return [html.escape(horizon_sentence(horizon, end, members)) + later]
 
 
 def _trust_lines(run: xr.Dataset) -> list[str]:

@@ -20,7 +20,7 @@ from flexclear.post.overview.curves import NOISE, Curve, curves, in_unit, readab
 from flexclear.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.post.plotting import style
 from flexclear.post.plotting.table import Table
-from flexclear.post.single_run.series import derive, parameters, sentence
+from flexclear.post.single_run.series import derive, horizon_sentence, parameters
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import InputError
 
@@ -164,7 +164,7 @@ def table(compared: xr.Dataset) -> Table:
     ]
     end = float(compared["time"].values[-1])
     notes += [
-        f"{label}: {sentence(float(horizon), end)} Later values hold for this run only."
+        f"{label}: {horizon_sentence(float(horizon), end)} Later values hold for this run only."
         for label, horizon in zip(labels, compared["horizon"].values, strict=True)
         if horizon < end
     ]

@@ -124,7 +124,7 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     axis = _line(points, width)
     if axis is not None:
         low, high = points[np.argmin(points @ axis)], points[np.argmax(points @ axis)]
-        return surfaces.bar(low, high, _thickness(solid, axis, width))
+        return surfaces.bar(low, high, _bar_radius(solid, axis, width))
     flat = _plane(points, width)
     if flat is not None:
         return _plate(points, flat, 1.3 * width, layer)
@@ -202,7 +202,7 @@ def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) 
     half = 0.0 if solid is None else float(solid.half.max())
     if solid is not None and _is_slender(solid, axis) and half < 1.5 * np.linalg.norm(com - point):
         far = com + half * axis
-        return surfaces.bar(point, far, _thickness(solid, axis, width))
+        return surfaces.bar(point, far, _bar_radius(solid, axis, width))
     radius = 2.4 * width if solid is None else float(np.clip(0.8 * half, 1.8 * width, 4.0 * width))
     return surfaces.join([surfaces.bar(point, com, 0.7 * width), surfaces.place(surfaces.sphere(radius), com)])
 
@@ -248,7 +248,7 @@ def _disc(radius: float, width: float) -> Surface:
     return surfaces.join([surfaces.cylinder(radius, width), mark])
 
 
-def _thickness(solid: Solid | None, axis: np.ndarray, width: float) -> float:
+def _bar_radius(solid: Solid | None, axis: np.ndarray, width: float) -> float:
     """Return the radius of a bar along an axis: that of the slender solid with its inertia, within visible limits."""
     if solid is None or not _is_slender(solid, axis):
         return 0.8 * width

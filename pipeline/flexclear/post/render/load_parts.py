@@ -60,7 +60,7 @@ def _spring_on_joint(at: Layout, load: Mapping[str, Any], size: float, bodies: S
         low, high = travel_range(at.run, name)
         side = 1.0 if 0.5 * (low + high) >= quantity(load.get("rest", 0.0), "length") else -1.0
         (origin, axes), centre = (
-            at.local(second),
+            at.frame_in_body(second),
             at.centre(second.partition(".")[0]) if at.owner(second) is not None else 0.0,
         )
         around = [

@@ -191,7 +191,7 @@ def _seats(at: Layout) -> dict[str, list[Seat]]:
     by_body: dict[str, list[Seat]] = {}
     for kind, frames in sites:
         for k, frame in enumerate(filter(None, frames)):
-            seat = Seat(frame, *at.local(frame), kind, k == 0)
+            seat = Seat(frame, *at.frame_in_body(frame), kind, k == 0)
             by_body.setdefault(frame.partition(".")[0], []).append(seat)
     return by_body
 
@@ -290,7 +290,7 @@ def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
     low = high = np.zeros(2)
     reach = 0.25 * size
     if at.owner(first) is None and second in at.frames:
-        origin, axes = at.local(first)
+        origin, axes = at.frame_in_body(first)
         path = (at.run.frame_position.values[:, at.frames.index(second)] - origin) @ axes
         low, high = path.min(axis=0)[:2], path.max(axis=0)[:2]
         reach = 2.5 * float(joint["ball_radius"])

@@ -310,7 +310,7 @@ def horizon(time: np.ndarray, velocity: np.ndarray, speed: float = 0.0) -> float
     return float(time[-1] if first is None else time[first])
 
 
-def sentence(horizon: float, end: float, members: float | None = None) -> str:
+def horizon_sentence(horizon: float, end: float, members: float | None = None) -> str:
     """Return a statement on a run's predictability horizon [s]; end: of the run [s].
 
     members: horizon of its ensemble [s], which may start further from the run than the perturbed run does.
