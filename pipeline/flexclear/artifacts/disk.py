@@ -1,7 +1,7 @@
 """Atomically written files with their own digests, copies for display, locks, and the removal of leftovers.
 
-Temporary files and locks of a process that died stay on disk, whatever ended it; `remove_leftovers` recognises temporary files by
-the name of their owner, and locks by nobody holding them.
+Temporary files and locks of a process that died stay on disk, whatever ended it; `remove_leftovers` recognises
+temporary files by the name of their owner, and locks by nobody holding them.
 """
 
 from __future__ import annotations
