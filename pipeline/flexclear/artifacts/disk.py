@@ -142,9 +142,8 @@ def temporary(path: Path) -> Iterator[Path]:
     try:
         yield scratch
     finally:
-        with contextlib.suppress(
-            PermissionError
-        ):  # on Windows, open in a library that failed: `remove_leftovers` removes it
+        # on Windows, open in a library that failed: `remove_leftovers` removes it
+        with contextlib.suppress(PermissionError):
             platforms.remove(scratch)
 
 

@@ -112,7 +112,7 @@ def _prune(options: argparse.Namespace) -> None:
     broken = [a for a in inventory.artifacts if store.fault(a.record) is not None]
     chosen += [artifact for artifact in broken if artifact not in chosen]
     size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in inventory.orphans)
-    store.sweep()
+    store.remove_leftovers()
     for artifact in chosen:
         maintenance.remove(store, artifact)
     for path in (*inventory.orphans, *inventory.unreadable):

@@ -96,7 +96,7 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
     jobs: largest number of processes; default: the cores this process may use. On a request to stop (`stopping`), tasks
     that can leave partial results do so, and count as failures; after Ctrl-C, KeyboardInterrupt follows.
     """
-    store.sweep()
+    store.remove_leftovers()
     plan = _Plan(in_order(tasks), tuple(in_order(tasks)))
     _settle_fresh(plan, store, sources)
     if plan.waiting:
