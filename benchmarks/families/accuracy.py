@@ -14,7 +14,7 @@ from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
 from flexclear.artifacts.paths import results_root
-from flexclear.post.cost.answer import Studied, sections
+from flexclear.post.cost.answer import Studied, advice_sections
 from flexclear.post.plotting.table import Table, as_markdown, from_markdown
 from flexclear.scene.load import load_scene
 from flexclear.stages.scenes import find_scene, open_workplace
@@ -54,7 +54,7 @@ def show(records: list[Record]) -> str:
         # what to refine is in the table of causes
         advice, _, _ = next(r["advice"] for r in mine if "advice" in r).partition(" To refine")
         found.append(Studied(scene, advice, tables, pictures))
-    return sections(tuple(found))
+    return advice_sections(tuple(found))
 
 
 def _shown(stored: Mapping[str, list]) -> bool:

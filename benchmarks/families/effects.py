@@ -18,7 +18,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engines, follow
-from flexclear.post.answers.effect_sizes import written
+from flexclear.post.answers.effect_sizes import format_difference
 from flexclear.scene.load import edited, load_scene
 from flexclear.stages import scenes
 from flexclear.stages.workplace import open_workplace
@@ -139,7 +139,7 @@ def show(records: list[Record]) -> dict[str, str]:
 
 def _cell(record: Record, name: str) -> str:
     value, chance = record[name], record[f"{name}_uncertainty"]
-    return "–" if value is None else written(value, chance or 0.0, record["unit"])
+    return "–" if value is None else format_difference(value, chance or 0.0, record["unit"])
 
 
 def _answers(found: dict[str, Record]) -> str:

@@ -25,26 +25,6 @@ if TYPE_CHECKING:
     from flexclear.artifacts.labelled import Labelled
     from flexclear.dynamics.record.cost import Cost
 
-__all__ = [
-    "PUBLISHING",
-    "Cost",
-    "Graph",
-    "Labelled",
-    "Outcome",
-    "Progress",
-    "Record",
-    "Task",
-    "Workplace",
-    "add_options",
-    "check",
-    "cost",
-    "open_workplace",
-    "origins",
-    "scenes_of",
-    "silent",
-    "simulate",
-    "task_over",
-]
 #: code that decides results of functions that use `flexclear.publishing`, for `Task.code`
 PUBLISHING = ("flexclear.publishing", "flexclear.post")
 

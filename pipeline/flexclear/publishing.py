@@ -6,28 +6,6 @@ from flexclear.post.plotting.drawing import View, shell, triad, tube, view
 from flexclear.post.plotting.table import Table, as_csv, as_html, from_markdown
 from flexclear.post.shapes.body_shape import rod_surface, scale_to
 
-__all__ = [
-    "Part",
-    "Table",
-    "View",
-    "as_csv",
-    "as_html",
-    "downloads",
-    "figures_of",
-    "files",
-    "from_markdown",
-    "media",
-    "page",
-    "prose",
-    "rod_surface",
-    "scale_to",
-    "shell",
-    "style",
-    "triad",
-    "tube",
-    "view",
-]
-
 
 def files(name: str, made: Table | style.Figure) -> dict[str, bytes]:
     """Return the files of a table, ``.csv`` and ``.md``, or of a figure, ``.png`` and ``.svg``."""

@@ -247,7 +247,7 @@ def test_a_turning_pin_wears_by_archards_law() -> None:
 def test_without_wear_nothing_of_it_is_recorded() -> None:
     table = hanging()
     del table["joint"]["hole"]["wear"]
-    assert not Scene.model_validate(table).worn()
+    assert not Scene.model_validate(table).wearing_joints()
     assert {name for name in RUN if name.startswith("wear_")}  # what there would be
     dataset = simulate(table)
     assert not [name for name in dataset if str(name).startswith("wear_")]

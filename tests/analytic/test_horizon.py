@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexclear import dynamics
-from flexclear.artifacts.quantities import DIVERGED, PERTURBATION, SEPARATED, lasting, separated_from
+from flexclear.artifacts.quantities import DIVERGED, PERTURBATION, SEPARATED, indices_of_lasting, separated_from
 from flexclear.dynamics import analyses
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import consistent_start
@@ -156,7 +156,7 @@ def test_without_a_free_coordinate_nothing_can_separate(what: str):
     ],
 )
 def test_a_separation_counts_where_it_lasts(separated: list[int], first: list[int]):
-    assert lasting(np.arange(8.0), np.array(separated, dtype=bool), 2.5).tolist() == first
+    assert indices_of_lasting(np.arange(8.0), np.array(separated, dtype=bool), 2.5).tolist() == first
 
 
 #: separations of two runs: close, visible, diverged

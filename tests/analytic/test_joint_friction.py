@@ -198,7 +198,7 @@ def axes_of(dataset: xr.Dataset, table: Scene, name: str) -> list[np.ndarray]:
 
 def require_consistent(dataset: xr.Dataset, table: Scene) -> None:
     """The record's wrenches follow from the bodies' motion alone (Newton and Euler), and bearings carry them."""
-    for name, one in table.rubbing().items():
+    for name, one in table.joints_with_friction().items():
         force, moment = (dataset[f"joint_{half}"].sel(joint=name).values for half in ("force", "moment"))
         assert one.friction is not None
         sizes = one.friction.model_dump()

@@ -12,7 +12,7 @@ import flexclear as fc
 mujoco = pytest.importorskip("mujoco", reason="pip install 'flexclear[robots]'")
 
 from benchmarks.families import robots  # noqa: E402
-from flexclear.scene.plausibility import implausible  # noqa: E402
+from flexclear.scene.plausibility import implausible_values  # noqa: E402
 from flexclear.stages.new_scene import write_from  # noqa: E402
 
 #: every kind of joint, several at a body, references, fixed bodies, one without mass, springs, armature
@@ -219,7 +219,7 @@ def test_rotors_are_plausible_and_not_drawn(tmp_path: Path):
     from flexclear.post.render.mechanism import Looks, shown_parts
 
     scene, _ = _scene(tmp_path, TREE)
-    assert implausible(scene) == []
+    assert implausible_values(scene) == []
     table = scene.model_dump(exclude_none=True)
     unseen = {name: {"geometry": []} for name, body in table["body"].items() if body.get("geometry") == ()}
     shown = shown_parts(table, Looks(unseen))

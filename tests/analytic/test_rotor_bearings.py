@@ -34,7 +34,7 @@ SPEED = 4000.0 * np.pi / 30.0
 @pytest.fixture(autouse=True)
 def one_thread() -> Iterator[None]:
     """As in the program: matrices are small."""
-    with threads.one():
+    with threads.limit_to_one():
         yield
 
 

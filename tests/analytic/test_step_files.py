@@ -13,7 +13,7 @@ import pytest
 
 from flexclear.commands.__main__ import main
 from flexclear.scene.load import load_scene
-from flexclear.stages.cad_scene import _fits
+from flexclear.stages.cad_scene import _fits_hole
 from flexclear.structure.fe.solid import geometry, step
 from flexclear.structure.fe.solid.recipe import StepFile
 from flexclear.structure.fe.solid.step import Round
@@ -128,7 +128,9 @@ def test_its_mesh_has_the_same_mass_the_wanted_size_and_equal_bytes(tmp_path: Pa
     assert 0.5 * 0.008 < np.median(edges.max(axis=(1, 2))) < 2.0 * 0.008
     again = kind.build(recipe, tmp_path)
     assert mesh.identical(again)
-    straight = step.read(StepFile(type="step", file="block.step", size=0.01, element="tet4"), tmp_path, "part")
+    straight = step.mesh_step_file(
+        StepFile(type="step", file="block.step", size=0.01, element="tet4"), tmp_path, "part"
+    )
     geometry.check(straight, "part")
 
 
@@ -201,9 +203,9 @@ def test_a_damaged_step_file_is_refused_in_one_sentence(tmp_path: Path, content:
 def test_a_solid_that_is_not_there_and_a_mesh_beyond_memory_are_refused(tmp_path: Path) -> None:
     write(tmp_path / "block.step", block)
     with pytest.raises(InputError, match=r"'block.step' has 1 solids, no solid 2"):
-        step.read(StepFile(type="step", file="block.step", size=0.01, solid=2), tmp_path, "part")
+        step.mesh_step_file(StepFile(type="step", file="block.step", size=0.01, solid=2), tmp_path, "part")
     with pytest.raises(ResourceError, match=r"a mesh of .* cells"):
-        step.read(StepFile(type="step", file="block.step", size=1e-7), tmp_path, "part")
+        step.mesh_step_file(StepFile(type="step", file="block.step", size=1e-7), tmp_path, "part")
     sheet = write(tmp_path / "sheet.step", lambda occ: occ.addRectangle(0.0, 0.0, 0.0, 10.0, 10.0))
     with pytest.raises(InputError, match=r"'sheet.step' has no solid"):
         step.solids(sheet, "part")
@@ -239,7 +241,7 @@ def test_a_shaft_belongs_to_a_hole_that_is_at_most_twice_as_wide(
     rounds = [
         Round(hole, np.zeros(3), np.array([0.0, 0.0, 1.0]), r, 20.0) for r, hole in zip(radii, holes, strict=True)
     ]
-    assert _fits(*rounds) == _fits(*rounds[::-1]) == fit
+    assert _fits_hole(*rounds) == _fits_hole(*rounds[::-1]) == fit
 
 
 @needs_gmsh

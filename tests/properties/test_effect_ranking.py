@@ -16,7 +16,7 @@ from flexclear.post.answers.effect_ranking import (
     table,
     undecided_quantities,
 )
-from flexclear.post.answers.effect_sizes import chart, stay
+from flexclear.post.answers.effect_sizes import chart, staying_contacts_sentence
 from flexclear.scene.quantity import Quantity
 
 VELOCITY = Quantity("slider", "velocity")
@@ -121,9 +121,9 @@ def test_a_quantity_that_goes_with_the_effect_is_called_not_comparable():
 
 
 def test_a_contact_that_no_ideal_joint_replaces_is_named_in_the_answer():
-    made = study(weak=Pair(point(0.0), point(5e-3), 0)).assign_attrs(staying=stay(["floor"]))
+    made = study(weak=Pair(point(0.0), point(5e-3), 0)).assign_attrs(staying=staying_contacts_sentence(["floor"]))
     assert "floor stays in every variant, as a ball on a plane has no ideal counterpart" in sentence(made, {})
-    assert stay([]) == ""
+    assert staying_contacts_sentence([]) == ""
 
 
 def test_effects_that_the_budget_did_not_reach_are_named_last():

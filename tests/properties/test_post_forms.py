@@ -14,7 +14,7 @@ import pytest
 
 from flexclear.dynamics import analyses
 from flexclear.post.render import film_speed, forms, gl, gltf, joint_view, player, surfaces, vibrations
-from flexclear.post.render.forms import Seat, equivalent, wheels
+from flexclear.post.render.forms import Seat, equivalent_solid, wheels
 from flexclear.post.render.mechanism import Looks, Mechanism, drawn_points, mechanism
 from flexclear.post.render.pictures import MAKERS, Shown, make
 from flexclear.post.render.vibrations import Vibrations
@@ -23,7 +23,7 @@ from flexclear.scene.load import load_scene
 from flexclear.stages import rendering, simulation
 from flexclear.stages.scenes import require_names
 from flexclear.structure.kinds import kind
-from flexclear.structure.modes.bundle import drawn
+from flexclear.structure.modes.bundle import rigid_drawing
 from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.paper import synthetic
@@ -48,7 +48,7 @@ def volume(surface: surfaces.Surface) -> float:
 
 def test_a_crank_with_the_inertia_of_a_flywheel_is_a_flat_bar_between_its_pins():
     """The drum with its inertia has a radius of 141 mm; the crank is 50 mm long."""
-    flywheel = equivalent(2.0, np.diag([0.01, 0.01, 0.02]))
+    flywheel = equivalent_solid(2.0, np.diag([0.01, 0.01, 0.02]))
     bar = forms.link([seat([0, 0, 0], "revolute"), seat([0.05, 0, 0], "revolute")], np.zeros(3), flywheel, 0.3)
     width = 2.0 * min(forms.WIDTH * 0.3, forms.WIDEST * 0.05)
     np.testing.assert_allclose(spans(bar)[:2], [0.05 + width, width], rtol=0.02)  # corners of a polygon of 32
@@ -73,7 +73,7 @@ def test_a_slender_bar_has_the_radius_of_its_inertia():
     """A steel bar of radius 6 and length 300 mm."""
     radius, length, mass = 0.006, 0.3, 0.27
     across = mass * (3 * radius**2 + length**2) / 12
-    solid = equivalent(mass, np.diag([0.5 * mass * radius**2, across, across]))
+    solid = equivalent_solid(mass, np.diag([0.5 * mass * radius**2, across, across]))
     bar = forms.link([seat([-0.15, 0, 0], "spherical"), seat([0.15, 0, 0], "spherical")], np.zeros(3), solid, 0.4)
     np.testing.assert_allclose(spans(bar), [0.3, 0.012, 0.012], rtol=0.01)
 
@@ -350,10 +350,10 @@ def test_a_rectangular_rod_is_drawn_with_its_sides(root: Path):
     shape = {"type": "straight-beam", "length": 0.2}
     plain = {"elements": 2, "shape": shape, "material": recipe["material"], "frames": {"a": {"x": 0.0}}}
     rectangle = {"section": {"type": "rectangle", "width": 0.012, "height": 0.008}}
-    flat = drawn(kind.build(plain | rectangle, root))
+    flat = rigid_drawing(kind.build(plain | rectangle, root))
     points, _ = surface(flat, np.zeros(1))
     assert np.ptp(points, axis=0) == pytest.approx([0.2, 0.012, 0.008], abs=1e-15)
     corners = np.abs(np.abs(points[:, 1:]) - [0.006, 0.004]).max(axis=1) < 1e-12
     assert corners.sum() == 5 * (2 * PER_CELL + 1)  # the first one is there twice
     round_one = plain | {"section": {"type": "tube", "radius": 0.01, "inner_radius": 0.008}}
-    assert drawn(kind.build(round_one, root))["radius"].values == pytest.approx(0.01, rel=1e-12)
+    assert rigid_drawing(kind.build(round_one, root))["radius"].values == pytest.approx(0.01, rel=1e-12)

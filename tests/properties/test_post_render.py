@@ -10,7 +10,7 @@ import xarray as xr
 import flexclear as fc
 from flexclear.artifacts.paths import PROJECT
 from flexclear.post.render import gl, gltf, player
-from flexclear.post.render.forms import equivalent
+from flexclear.post.render.forms import equivalent_solid
 from flexclear.post.render.layout import part_pose
 from flexclear.post.render.mechanism import Looks, drawn_points, mechanism
 from flexclear.post.render.panel import panel
@@ -35,7 +35,7 @@ def test_round_bodies_are_drawn_with_their_own_radius_length_and_axis(
     """From mass and inertia; a disc without thickness is drawn with some, to be seen."""
     mass, z = 2.0, np.array(axis)
     along, across = 0.5 * mass * radius**2, mass * (3.0 * radius**2 + length**2) / 12.0
-    solid = equivalent(mass, across * np.eye(3) + (along - across) * np.outer(z, z))
+    solid = equivalent_solid(mass, across * np.eye(3) + (along - across) * np.outer(z, z))
     assert solid.round
     np.testing.assert_allclose(solid.half, [radius, radius, half], rtol=1e-12)
     assert abs(solid.axes[:, 2] @ z) == pytest.approx(1.0, abs=1e-12)
@@ -43,7 +43,7 @@ def test_round_bodies_are_drawn_with_their_own_radius_length_and_axis(
 
 def test_box_is_drawn_with_its_own_edges():
     mass, a, b, c = 1.3, 0.1, 0.2, 0.35
-    solid = equivalent(mass, np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) * mass / 12.0)
+    solid = equivalent_solid(mass, np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) * mass / 12.0)
     assert not solid.round
     assert sorted(solid.half) == pytest.approx([a / 2, b / 2, c / 2], rel=1e-12)
     assert np.linalg.det(solid.axes) == pytest.approx(1.0)

@@ -35,7 +35,7 @@ def alone(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> li
 
 
 def batched(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
-    return sweep_points._together(runner(scene, **asked), scene, points)
+    return sweep_points._run_together(runner(scene, **asked), scene, points)
 
 
 def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:

@@ -17,7 +17,7 @@ from flexclear.commands.check import examine
 from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.scene import lines
 from flexclear.scene.json_schema import scene_schema
-from flexclear.scene.plausibility import implausible
+from flexclear.scene.plausibility import implausible_values
 from flexclear.scene.schema import Scene
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
@@ -119,7 +119,7 @@ def test_nothing_that_the_project_ships_is_doubted(path: Path, validators):
 def test_a_value_of_the_command_line_is_doubted_where_it_is_given(
     verb: str, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch, fresh: Path
 ):
-    monkeypatch.setattr(show, "shown", lambda scene, quiet: ([], None))  # nothing is drawn
+    monkeypatch.setattr(show, "show_start", lambda scene, quiet: ([], None))  # nothing is drawn
     scene, _ = write("slider-crank", tmp_path)
     said = command(verb, scene, "--set", "joint.pin.clearance=0.2").err
     assert "warning: --set joint.pin.clearance: 200 mm is more than the pin's radius, 10 mm" in said
@@ -187,7 +187,7 @@ def test_a_disc_is_larger_than_the_distances_of_its_frames_and_denser_than_air(s
     moments = [k * 10.0 * square_radius for k in (0.5, 0.5, 1.0)]
     bodies = {"ground": ground(axle=(0, 0, 0)), "disc": rigid(10.0, moments, {"centre": frame((1e-3, 0.0, 0.0))})}
     table = mechanisms.scene(bodies, {"axle": joint("revolute", "ground.axle", "disc.centre")}, end=1.0)
-    assert bool(implausible(Scene.model_validate(table))) == warned
+    assert bool(implausible_values(Scene.model_validate(table))) == warned
 
 
 def test_the_schema_refuses_what_is_no_scene(validators):

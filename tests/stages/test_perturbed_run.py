@@ -236,7 +236,7 @@ def test_a_twin_does_not_wait_for_a_run_that_never_began() -> None:
         raise SolverError("its end")
 
     def interrupted() -> None:
-        with cores.meanwhile(lambda alive: pair.perturbed_run(start, steps, alive)):
+        with cores.run_in_thread(lambda alive: pair.perturbed_run(start, steps, alive)):
             assert came.wait(PATIENCE)
             raise KeyboardInterrupt
 
@@ -253,7 +253,7 @@ def test_where_no_thread_is_to_be_had_the_work_is_done_when_its_result_is_asked_
         raise RuntimeError("can't start new thread")
 
     monkeypatch.setattr(threading.Thread, "start", none)
-    with cores.meanwhile(lambda alive: threading.get_ident()) as result:
+    with cores.run_in_thread(lambda alive: threading.get_ident()) as result:
         assert result() == threading.get_ident()
 
 
@@ -310,7 +310,7 @@ def test_concurrent_work_ends_with_its_block(monkeypatch: pytest.MonkeyPatch) ->
             ended.set()
 
     began = time.monotonic()
-    with pytest.raises(KeyError), cores.meanwhile(work):
+    with pytest.raises(KeyError), cores.run_in_thread(work):
         raise KeyError
     assert ended.is_set()
     assert time.monotonic() - began < 0.5 * PATIENCE
@@ -331,7 +331,7 @@ def test_what_concurrent_work_raises_reaches_its_caller(count: int, monkeypatch:
     def threads(alive: Progress) -> int:
         return threading.get_ident()
 
-    with pytest.raises(KeyError, match="work"), cores.meanwhile(work) as result:
+    with pytest.raises(KeyError, match="work"), cores.run_in_thread(work) as result:
         result()
-    with cores.meanwhile(threads) as result:
+    with cores.run_in_thread(threads) as result:
         assert (result() == threading.get_ident()) is (count == 1)

@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 count = lambda: {library["num_threads"] for library in threadpool_info()}
 print(count())
 threadpool_limits(2)
-with threads.one():
+with threads.limit_to_one():
     print(count())
 """
 

@@ -305,12 +305,12 @@ def test_what_the_dead_left_is_swept_and_what_is_held_stays(store: Store):
     for name in names:
         (folder / name).touch()
     with store.lock("simulate", "e" * 32):
-        store.sweep()
+        store.remove_leftovers()
         assert {name: (folder / name).exists() for name in names} == names
         assert (folder / f"{'e' * 32}.lock").exists()
     assert not (folder / f"{'e' * 32}.lock").exists()
     os.utime(folder / f".c.0badcafe-{dead.pid}.0badcafe.tmp", (0.0, 0.0))
-    store.sweep()
+    store.remove_leftovers()
     assert not (folder / f".c.0badcafe-{dead.pid}.0badcafe.tmp").exists()
 
 

@@ -26,7 +26,7 @@ from tests.processes import python
 
 def one(width: int = 1) -> int:
     """Number of the process that does something for a team of that width."""
-    with workers.team(width) as team, workers.lost():
+    with workers.team(width) as team, workers.report_lost_worker():
         return int(team.pool.submit(os.getpid).result())
 
 
@@ -44,7 +44,7 @@ def fail() -> None:
 
 
 def stop() -> None:
-    with stopping.until(-1.0, "time is over"), workers.team(1):
+    with stopping.stop_after(-1.0, "time is over"), workers.team(1):
         assert stopping.stop_reason()
 
 
@@ -129,7 +129,7 @@ def test_a_worker_that_is_killed_between_two_calls_is_one_sentence() -> None:
         worker = one()
         os.kill(worker, signal.SIGKILL)
         wait_until(lambda: not running(worker))
-        with pytest.raises(ResourceError, match="a helper process was killed"), workers.lost():
+        with pytest.raises(ResourceError, match="a helper process was killed"), workers.report_lost_worker():
             often()
     assert one() != worker
 
@@ -172,7 +172,7 @@ def stopped_reason(_: int) -> str:
 
 def test_a_stop_reaches_workers_to_which_sigterm_was_sent_and_does_not_wait_for_killed_ones() -> None:
     """As `timeout` and services send it, to all processes of a command."""
-    with workers.team(2) as team, workers.lost():
+    with workers.team(2) as team, workers.report_lost_worker():
         futures = [team.pool.submit(stopped_reason, k) for k in range(2)]
         busy = list(team.pool._processes)
         while any(not future.running() for future in futures):

@@ -35,23 +35,23 @@ def table(bundle: xr.Dataset) -> str:
         else f"  frequencies of the free body within 1 %: none; the first is at {first:.6g} Hz",
         *_lines_on_matrices(bundle),
         "  static compliance, per cent of the full model, axes of the frame",
-        _row("frame", "held", bundle["direction"].values.tolist()),
+        _compliance_row("frame", "held", bundle["direction"].values.tolist()),
     ]
     names = [str(name) for name in bundle["frame"].values]
     for name in names:
         for held in [other for other in names if other != name] + [name]:
             fraction = bundle["compliance_share"].sel(frame=name, frame_held=held).values
             shown = [_percent(value) for value in fraction]
-            lines.append(_row(name, "nothing" if held == name else held, shown))
+            lines.append(_compliance_row(name, "nothing" if held == name else held, shown))
     lines += ["  largest error of a frame's motion under a unit load on it, m/N and rad/(N m)"]
-    lines.append(_row("frame", "load, Hz", bundle["direction"].values.tolist()))
+    lines.append(_compliance_row("frame", "load, Hz", bundle["direction"].values.tolist()))
     for name in names:
         for hertz in bundle["bound_frequency"].values:
             bound = bundle["error_bound"].sel(frame=name, bound_frequency=hertz).values
-            lines.append(_row(name, f"{hertz:.5g}", [f"{value:.2e}" for value in bound]))
+            lines.append(_compliance_row(name, f"{hertz:.5g}", [f"{value:.2e}" for value in bound]))
     total = bundle["effective_mass"].sum("mode").values
     lines += ["  effective mass of all modes, kg and kg m2"]
-    lines.append(_row("", "", [f"{value:.3g}" for value in total]))
+    lines.append(_compliance_row("", "", [f"{value:.3g}" for value in total]))
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -66,7 +66,7 @@ def _lines_on_matrices(bundle: xr.Dataset) -> list[str]:
     return lines
 
 
-def _row(frame: str, held: str, values: Sequence[object]) -> str:
+def _compliance_row(frame: str, held: str, values: Sequence[object]) -> str:
     return f"  {frame:<14} {held:<10}" + "".join(f"{value!s:>{WIDTH + 1}}" for value in values)
 
 

@@ -1,7 +1,7 @@
 """Atomically written files with their own digests, copies for display, locks, and the removal of leftovers.
 
-Temporary files and locks of a process that died stay on disk, whatever ended it; `sweep` recognises temporary files by
-the name of their owner, and locks by nobody holding them.
+Temporary files and locks of a process that died stay on disk, whatever ended it; `remove_leftovers` recognises
+temporary files by the name of their owner, and locks by nobody holding them.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def encode_with_digest(table: Mapping[str, Any]) -> bytes:
 
 
 def read_checked(path: Path) -> dict[str, Any] | None:
-    """Return the table in a file of `encode_with_digest`; None without the file, or where a bit of it changed."""
+    """Return the table in a file of `encode_with_digest`; None without such a file, or where a bit has changed."""
     try:
         whole = json.loads(read_whole(path, LARGEST_TABLE))
         table = whole["content"]
@@ -142,7 +142,8 @@ def temporary(path: Path) -> Iterator[Path]:
     try:
         yield scratch
     finally:
-        with contextlib.suppress(PermissionError):  # on Windows, open in a library that failed: `sweep` removes it
+        # on Windows, open in a library that failed: `remove_leftovers` removes it
+        with contextlib.suppress(PermissionError):
             platforms.remove(scratch)
 
 
@@ -206,7 +207,7 @@ def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
     return lock
 
 
-def sweep(root: Path) -> int:
+def remove_leftovers(root: Path) -> int:
     """Remove temporary files and locks of ended processes below `root`, and unfinished work that nobody has continued
     for long; return the number of removed files."""
     removed = 0
@@ -215,7 +216,7 @@ def sweep(root: Path) -> int:
             if not name.endswith((".tmp", ".part", ".lock")):
                 continue
             path = Path(folder, name)
-            if (name.endswith(".tmp") and _is_abandoned(path)) or (name.endswith(".part") and _old(path)):
+            if (name.endswith(".tmp") and _is_abandoned(path)) or (name.endswith(".part") and _is_old(path)):
                 with contextlib.suppress(OSError):  # the folder is read-only, or another process removes the file
                     path.unlink()
                     removed += 1
@@ -230,11 +231,11 @@ def _is_abandoned(path: Path) -> bool:
     if match is None:
         return False  # not a file of this program
     if match["host"] != _host():
-        return _old(path)
+        return _is_old(path)
     return not platforms.alive(int(match["pid"]))
 
 
-def _old(path: Path) -> bool:
+def _is_old(path: Path) -> bool:
     with contextlib.suppress(OSError):
         return time.time() - path.stat().st_mtime > ABANDONED_AFTER
     return False

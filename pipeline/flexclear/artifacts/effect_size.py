@@ -87,7 +87,7 @@ class Agreement:
         return most / self.allowed if self.allowed > 0.0 else np.inf if most > 0.0 else 0.0
 
     @property
-    def met(self) -> bool:
+    def is_met(self) -> bool:
         """True when error and chance together are within the allowed error."""
         return self.error + self.chance <= self.allowed
 
@@ -153,22 +153,22 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
         return _impact_times(a, b, quantity.name)
     differences, uncertainties = [], []
     for what in _with_reductions(quantity):
-        distance, error = _along(a, b, what, members)
+        distance, error = _distance_of_means(a, b, what, members)
         uncertainty = chance(members) * error
-        differences.append(float(_beyond(distance, uncertainty).max(initial=0.0)))
+        differences.append(float(_excess_over_chance(distance, uncertainty).max(initial=0.0)))
         uncertainties.append(float(uncertainty.max(initial=0.0)))
     result = Influence(max(differences), max(uncertainties))
     return Influence(0.0) if result.most <= max(rounding(a, quantity), rounding(b, quantity)) else result
 
 
-def _along(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray, np.ndarray]:
+def _distance_of_means(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance of two means at each output and its standard error; infinite where a quantity is missing.
 
     Points with equal values and deviations are the same members: their distance is zero, without error.
     """
     if what.name not in a.values or what.name not in b.values:
         return np.array([np.inf]), np.zeros(1)
-    one, two = (_rows(p.values[what.name]) for p in (a, b))
+    one, two = (_as_rows(p.values[what.name]) for p in (a, b))
     deviations = [_deviations(p, what) for p in (a, b)]
     if np.array_equal(one, two) and np.array_equal(deviations[0], deviations[1]):
         return np.zeros(len(one)), np.zeros(len(one))
@@ -178,7 +178,7 @@ def _along(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray
     return np.linalg.norm(one - two, axis=1), error
 
 
-def _beyond(distance: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:
+def _excess_over_chance(distance: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:
     """Return the part of distances that exceeds chance."""
     squares: np.ndarray = np.maximum(0.0, distance**2 - uncertainty**2)
     return np.sqrt(squares)
@@ -244,7 +244,7 @@ def predictable_difference(
         return Influence(np.nan, np.nan)
     if quantity.kind == "impact_times" or what.name not in a.values or what.name not in b.values:
         return _impact_times(a, b, quantity.name) if quantity.kind == "impact_times" else Influence(np.inf)
-    distance, spread = _along(_begin(a, what.name, outputs), _begin(b, what.name, outputs), what, members)
+    distance, spread = _distance_of_means(_begin(a, what.name, outputs), _begin(b, what.name, outputs), what, members)
     uncertainty = chance(members) * spread + error
     sure = distance >= REAL * uncertainty
     if not (sure & (distance > max(rounding(a, quantity), rounding(b, quantity)))).any():
@@ -274,21 +274,21 @@ def same_starts(a: Point, b: Point, quantity: Quantity, requested: float) -> Inf
         return _impact_times(a, b, quantity.name)
     n, error, most = len(b.members), 0.0, 0.0
     for what in _with_reductions(quantity):
-        distance, _ = _along(a, b, what, n)
+        distance, _ = _distance_of_means(a, b, what, n)
         if np.isinf(distance).any():
             return Influence(np.inf)
-        of_pairs, allowed = _of_pairs(a, b, what), _allowed_error(b, what, requested)
+        of_pairs, allowed = _error_of_pairs(a, b, what), _allowed_error(b, what, requested)
         alike = allowed <= requested
         uncertainty = stdtrit(n - 1.0, 1.0 - 0.5 * LIKELY) * np.where(alike, of_pairs, allowed / np.sqrt(n))
-        error = max(error, float((_beyond(distance, uncertainty) * requested / allowed).max(initial=0.0)))
+        error = max(error, float((_excess_over_chance(distance, uncertainty) * requested / allowed).max(initial=0.0)))
         most = max(most, error, float(distance[alike].max(initial=0.0)))
     return Influence(error, most - error)
 
 
-def _of_pairs(a: Point, b: Point, what: Recorded) -> np.ndarray:
+def _error_of_pairs(a: Point, b: Point, what: Recorded) -> np.ndarray:
     """Return the standard error of the mean difference of two ways to run a scene, by pairs of equal starts."""
     pairs = zip(a.members, b.members, strict=True)
-    spread = np.std([_rows(one[what.name]) - _rows(two[what.name]) for one, two in pairs], axis=0, ddof=1)
+    spread = np.std([_as_rows(one[what.name]) - _as_rows(two[what.name]) for one, two in pairs], axis=0, ddof=1)
     return _pool_errors(np.linalg.norm(spread, axis=1) * (2.0 if _turns(what) else 1.0)) / np.sqrt(len(b.members))
 
 
@@ -300,7 +300,7 @@ def _allowed_error(full: Point, what: Recorded, requested: float) -> np.ndarray:
 
 def _deviations(point: Point, what: Recorded) -> np.ndarray:
     """Return the standard deviation of one member at each output."""
-    rows = _rows(point.deviation.get(what.name, np.zeros(len(_rows(point.values[what.name])))))
+    rows = _as_rows(point.deviation.get(what.name, np.zeros(len(_as_rows(point.values[what.name])))))
     return np.linalg.norm(rows, axis=1) * (2.0 if _turns(what) else 1.0)
 
 
@@ -314,14 +314,14 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
         return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
     results = []
     for what in _with_reductions(quantity):
-        distance, uncertainty = _along(planned, full, what, members)
+        distance, uncertainty = _distance_of_means(planned, full, what, members)
         if np.isinf(distance).any():
             return Agreement(np.inf, 0.0, requested)
         uncertainty = chance(members) * uncertainty
         if min(len(planned.members), len(full.members)) > 1:
-            of_pairs = stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _of_pairs(planned, full, what)
+            of_pairs = stdtrit(members - 1.0, 1.0 - 0.5 * RARE) * _error_of_pairs(planned, full, what)
             uncertainty = np.minimum(uncertainty, of_pairs)
-        error, allowed = _beyond(distance, uncertainty), _allowed_error(full, what, requested)
+        error, allowed = _excess_over_chance(distance, uncertainty), _allowed_error(full, what, requested)
         floor = np.maximum(allowed, np.finfo(float).tiny)  # the allowed error of a constant quantity is zero
         worst = int(np.argmax((error - uncertainty) / floor))
         if error[worst] - uncertainty[worst] <= allowed[worst]:
@@ -376,7 +376,7 @@ def size(point: Point, quantity: Quantity) -> float:
         return float(np.nan_to_num(point.values[f"{name}.last"]))
     if quantity.kind in ("peak_force", "impulse"):
         return float(np.abs(point.values[_with_reductions(quantity)[0].name]))
-    values = _rows(point.values[f"{name}.series"])
+    values = _as_rows(point.values[f"{name}.series"])
     if quantity.kind == "orientation":
         return float(rotation_between(values[:1], values).max())
     if quantity.of_place:
@@ -389,6 +389,6 @@ def rounding(point: Point, quantity: Quantity) -> float:
     return ROUNDING * float(point.values.get(_whole(quantity).name, 0.0)) if quantity.component else 0.0
 
 
-def _rows(values: np.ndarray) -> np.ndarray:
+def _as_rows(values: np.ndarray) -> np.ndarray:
     values = np.asarray(values, dtype=float)
     return values.reshape(len(values), -1) if values.ndim else values.reshape(1, 1)

@@ -64,7 +64,7 @@ def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
     of whose points stay, since the sweep continues with them.
     """
     made = {artifact.record.digest: artifact.record for artifact in listed.artifacts}
-    in_use, waiting = set(), list(_shown(store))
+    in_use, waiting = set(), list(_shown_records(store))
     while waiting:
         record = waiting.pop()
         if (record.stage, record.key) not in in_use:
@@ -113,13 +113,15 @@ def find(store: Store, what: str) -> Record | None:
     if path.is_file():
         for facts in (path.parent / ".facts").glob("*.json"):
             record = read_record(facts)
-            if record is not None and any(_same(path, store.path(record.stage, record.key, f)) for f in record.files):
+            if record is not None and any(
+                _is_same_file(path, store.path(record.stage, record.key, f)) for f in record.files
+            ):
                 return record
     records = [path for path in _records(store) if path.stem.startswith(what)]
     return read_record(records[0]) if len(records) == 1 else None
 
 
-def _same(path: Path, other: Path) -> bool:
+def _is_same_file(path: Path, other: Path) -> bool:
     try:
         return digest_of(path) == digest_of(other)
     except OSError:
@@ -135,7 +137,7 @@ def _records(store: Store) -> list[Path]:
     return sorted(path for path in cache.rglob("*.json") if path.parent != cache and "." not in path.stem)
 
 
-def _shown(store: Store) -> Iterator[Record]:
+def _shown_records(store: Store) -> Iterator[Record]:
     for folder, _, names in os.walk(store.root):
         if Path(folder).name == ".facts":
             records = (read_record(Path(folder, name)) for name in names if name.endswith(".json"))

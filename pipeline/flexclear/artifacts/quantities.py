@@ -42,7 +42,7 @@ DIVERGED = 0.03
 LASTING = 1.0 / 36.0
 
 
-def lasting(time: np.ndarray, separated: np.ndarray, least: float) -> np.ndarray:
+def indices_of_lasting(time: np.ndarray, separated: np.ndarray, least: float) -> np.ndarray:
     """Return the indices of the times from which `separated` holds for at least `least` [s] or to the last time.
 
     time [s], separated: shape (n,).
@@ -57,7 +57,7 @@ def divergence(time: np.ndarray, separation: np.ndarray, span: float) -> int | N
 
     time [s], separation (fraction of the largest motion): shape (n,). span: duration of the whole run [s].
     """
-    return next(iter(lasting(time, separation > DIVERGED, LASTING * span).tolist()), None)
+    return next(iter(indices_of_lasting(time, separation > DIVERGED, LASTING * span).tolist()), None)
 
 
 def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
@@ -71,7 +71,7 @@ def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int
         time, separation = time[: diverged + 1], separation[: diverged + 1]
     visible = separation > SEPARATED
     left = np.cumsum(visible[::-1])[::-1]  # number of visibly separated outputs from each time on
-    starts = lasting(time, visible, LASTING * span)
+    starts = indices_of_lasting(time, visible, LASTING * span)
     return next(iter(starts[2 * left[starts] > len(time) - starts].tolist()), None)
 
 
@@ -154,7 +154,7 @@ def owners(run: xr.Dataset) -> dict[str, dict[str, bool]]:
     return known
 
 
-def has(run: xr.Dataset, quantity: Quantity) -> bool:
+def has_quantity(run: xr.Dataset, quantity: Quantity) -> bool:
     """Return True when a run holds this quantity."""
     known = owners(run)
     return quantity.is_there(known) and all(KINDS[term.kind].variable in run for term in quantity.terms())

@@ -351,7 +351,7 @@ def _units(data: LabelledArrays, name: str, variable: Variable) -> tuple[str, La
     return "", LabelledArray((dim,), each, words)
 
 
-def incomplete(run: AnyRun, why: str) -> AnyRun:
+def mark_incomplete(run: AnyRun, why: str) -> AnyRun:
     """Mark a run that was stopped: attributes `complete` (0), `stopped_at` [s] and `stopped_by`."""
     return run.assign_attrs(complete=0, stopped_at=float(run["time"].values[-1]), stopped_by=why)
 

@@ -26,9 +26,9 @@ from flexclear.artifacts.disk import (
     publish,
     read_checked,
     read_whole,
+    remove_leftovers,
     settle,
     sha256,
-    sweep,
     temporary,
 )
 from flexclear.system import platforms
@@ -134,7 +134,7 @@ class Store:
             folder.mkdir(parents=True, exist_ok=True)
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
-                digests[name] = publish(path, content) if isinstance(content, bytes) else _written(path, content)
+                digests[name] = publish(path, content) if isinstance(content, bytes) else _write_content(path, content)
             attributes = getattr(product.get(MAIN), "attrs", {})  # empty where the main file is no dataset
             reported = {name: str(attributes[name]) for name in REPORTED if attributes.get(name)}
             record = Record(stage, key, digests, dict(facts), reported, computed_by or {})
@@ -268,9 +268,9 @@ class Store:
                 leftover.unlink(missing_ok=True)
             yield
 
-    def sweep(self) -> None:
+    def remove_leftovers(self) -> None:
         """Remove the temporary files and locks that killed processes left anywhere."""
-        sweep(self.root)
+        remove_leftovers(self.root)
 
     def below(self, path: Path) -> str:
         """Return a path in the form in which messages name it."""
@@ -301,12 +301,12 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
     Equal datasets give equal bytes: no times or names of this machine.
     """
-    digest = _written(path, dataset)
+    digest = _write_content(path, dataset)
     platforms.sync_folder(path.parent)
     return digest
 
 
-def _written(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
+def _write_content(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
     """Write a dataset as `write_dataset` does, without forcing its name to the disk."""
     from flexclear.artifacts import netcdf  # here, since commands with nothing to compute write nothing
     from flexclear.artifacts.labelled import of

@@ -38,10 +38,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Run the requested action."""
-    {"size": _size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
+    {"size": _print_size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
 
 
-def _size(options: argparse.Namespace) -> None:
+def _print_size(options: argparse.Namespace) -> None:
     store = open_workplace().store
     inventory = maintenance.inventory(store, whole=False)
     sizes: dict[str, list[int]] = {}
@@ -112,7 +112,7 @@ def _prune(options: argparse.Namespace) -> None:
     broken = [a for a in inventory.artifacts if store.fault(a.record) is not None]
     chosen += [artifact for artifact in broken if artifact not in chosen]
     size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in inventory.orphans)
-    store.sweep()
+    store.remove_leftovers()
     for artifact in chosen:
         maintenance.remove(store, artifact)
     for path in (*inventory.orphans, *inventory.unreadable):

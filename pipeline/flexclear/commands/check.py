@@ -19,7 +19,7 @@ from flexclear.scene import lines
 from flexclear.scene.limits import Limits
 from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file
 from flexclear.scene.references import dangling_names
-from flexclear.scene.segments import body_frames, cut
+from flexclear.scene.segments import body_frames, cut_segments
 from flexclear.scene.toml_files import read_toml
 from flexclear.scene.variants import ideal, replaceable_contacts
 from flexclear.stages import meshing, modal_analysis, scenes, show, simulation
@@ -102,7 +102,7 @@ def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | No
         if kind_of_file(read_toml(scenes.find_scene(name))) == SCENE:
             scene = scenes.load_by_name(name, settings)
             scenes.require_names(scene)
-            return show.shown(scene, quiet=quiet)[1]
+            return show.show_start(scene, quiet=quiet)[1]
     except MISTAKES:  # listed with all others
         pass
     return None
@@ -119,7 +119,7 @@ class Findings:
     def attempt(self, check: Callable[[], Any], path: Path | None = None) -> bool:
         """Run a check and collect its errors, located in a file.  Returns True when the check passes."""
         try:
-            with scenes.in_file(path):
+            with scenes.errors_in_file(path):
                 check()
         except MISTAKES as error:
             raised = errors_of(error) if isinstance(error, InputError) else [error]
@@ -147,11 +147,11 @@ def examine(name: str, settings: Sequence[str] = (), refused: InputError | None 
 
 def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
     path = scenes.find_scene(name)
-    {SCENE: _scene, SWEEP: _sweep, RECIPE: _recipe}[kind_of_file(read_toml(path))](path, settings, findings)
+    {SCENE: _examine_scene, SWEEP: _sweep, RECIPE: _recipe}[kind_of_file(read_toml(path))](path, settings, findings)
 
 
-def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
-    findings.attempt(lambda: refuse(dangling_names(cut(compose(path), str(path)), body_frames, str(path))))
+def _examine_scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
+    findings.attempt(lambda: refuse(dangling_names(cut_segments(compose(path), str(path)), body_frames, str(path))))
     loaded: list[Scene] = []
     findings.attempt(lambda: loaded.append(scenes.load_by_name(str(path), settings)))
     # bodies may share a recipe, which is meshed once
@@ -163,7 +163,7 @@ def _scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
         findings.errors += scenes.missing_stress_errors(scene)
         complete = findings.attempt(partial(Graph(scene).up_to, "post"), path) and not findings.errors
         for name, part in scene.flexible().items():
-            findings.attempt(partial(_reference, name, part), path)
+            findings.attempt(partial(_check_reference, name, part), path)
         findings.attempt(partial(simulation.check_parts, simulation.params(scene)), path)
         if scene.sections is not None:
             findings.attempt(partial(_sections, scene), path)
@@ -239,7 +239,7 @@ def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
         bodies |= {name: body} if body is not None else {}
     for name, part in whole.flexible().items():
         if name in bodies:
-            findings.attempt(partial(_modes, bodies[name], name, part), whole.path)
+            findings.attempt(partial(_check_modes, bodies[name], name, part), whole.path)
     if set(bodies) != set(whole.recipes()):
         return
     rigid = {name: body.rigid for name, body in bodies.items()}
@@ -299,20 +299,20 @@ def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[In
         )
 
 
-def _reference(name: str, part: FlexibleBody) -> None:
-    with _in_body(name):
+def _check_reference(name: str, part: FlexibleBody) -> None:
+    with _errors_in_body(name):
         modal_analysis.check(modal_analysis.params(part))
 
 
-def _modes(body: Body, name: str, part: FlexibleBody) -> None:
+def _check_modes(body: Body, name: str, part: FlexibleBody) -> None:
     from flexclear.structure.modes.solution import require_possible
 
-    with _in_body(name):
+    with _errors_in_body(name):
         require_possible(body.model, part.modes, body.interfaces)
 
 
 @contextmanager
-def _in_body(name: str) -> Iterator[None]:
+def _errors_in_body(name: str) -> Iterator[None]:
     """Add a body to the place of an error, which is a key of the body."""
     try:
         yield

@@ -126,7 +126,7 @@ def command(options: argparse.Namespace) -> None:
         return
     if options.compile is not None:
         names = compile_named_scenes(options.compile, open_workplace())
-        print(f"compiled: all functions for runs of {', '.join(names)}; {_kernels()[0]}")
+        print(f"compiled: all functions for runs of {', '.join(names)}; {_describe_kernels()[0]}")
         return
     wrong = []
     for name, text, fine in findings():
@@ -147,13 +147,13 @@ def findings() -> Iterator[tuple[str, str, bool | None]]:
     missing = [name for name in LIBRARIES if versions[name] == "absent"]
     yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), not missing
     yield "memory", f"{machine.size(machine.memory())} free", machine.memory() > LITTLE_MEMORY
-    yield "results", *_results(results_root())
-    yield "kernels", *_kernels()
-    yield "graphics", *_graphics()
+    yield "results", *_describe_results(results_root())
+    yield "kernels", *_describe_kernels()
+    yield "graphics", *_describe_graphics()
     yield "self-test", *_self_test()
 
 
-def _results(root: Path) -> tuple[str, bool]:
+def _describe_results(root: Path) -> tuple[str, bool]:
     """Return the folder of results with its free space and obstacles to writing, and True without obstacles."""
     free = machine.disk(root)
     wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
@@ -162,7 +162,7 @@ def _results(root: Path) -> tuple[str, bool]:
     return "; ".join([f"{root}, {machine.size(free)} free", *wrong]), not wrong
 
 
-def _kernels() -> tuple[str, bool]:
+def _describe_kernels() -> tuple[str, bool]:
     messages: list[str] = []
     try:
         folder = writable(kernel_root(), messages.append)
@@ -176,7 +176,7 @@ def _kernels() -> tuple[str, bool]:
     return text, True
 
 
-def _graphics() -> tuple[str, bool | None]:
+def _describe_graphics() -> tuple[str, bool | None]:
     """Draw something, since libraries that load may still fail; without them only pictures of shapes are lacking."""
     if gl.works():
         return f"{gl.state()}; a picture was drawn", True

@@ -43,7 +43,7 @@ def command(options: argparse.Namespace) -> None:
     graphs, workplace = scenes.graphs(options.scenes, options.set), open_workplace(options)
     made = list[Task]()
     for graph in graphs:
-        with scenes.in_file(graph.scene.path):
+        with scenes.errors_in_file(graph.scene.path):
             made += graph.render.values() if requested is None else [graph.picture(*requested, time)]
     if len(graphs) > 1 and requested == ("modes", "html"):
         made.append(_mode_sets(graphs))
@@ -84,5 +84,5 @@ def _mode_sets(graphs: list[Graph]) -> Task:
         params={"what": "modes", "format": "html", "title": "Mode sets side by side"},
         inputs=bundles,
         code=("flexclear.stages.simulation", "flexclear.post"),
-        folder=f"compare/{scenes.joined([graph.scene.name for graph in graphs])}",
+        folder=f"compare/{scenes.joint_folder_name([graph.scene.name for graph in graphs])}",
     )

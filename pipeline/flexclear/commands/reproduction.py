@@ -55,10 +55,10 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
         if not path.relative_to(top).as_posix().isprintable():
             raise InputError(str(path), "has a name that other systems cannot read", "rename it")
     done, digest = _run(scene, settings, os.environ)
-    hidden = _hidden(top)
+    hidden = _hidden_words(top)
     facts = {
         "scene": scene.relative_to(top).as_posix(),
-        "settings": [_without(text, hidden) for text in settings],
+        "settings": [_replace_hidden(text, hidden) for text in settings],
         "exit_code": done.returncode,
         "run": digest,
         "flexclear": version(),
@@ -66,10 +66,12 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}",
         "libraries": {library: library_version(library) for library in libraries},
-        "environment": {k: _without(v, hidden) for k, v in sorted(os.environ.items()) if k.startswith(VARIABLES)},
+        "environment": {
+            k: _replace_hidden(v, hidden) for k, v in sorted(os.environ.items()) if k.startswith(VARIABLES)
+        },
     }
     content = {FACTS: json.dumps(facts, indent=1, sort_keys=True).encode()}
-    content[LOG] = _without(done.stdout + done.stderr, hidden)[-LONGEST_LOG:].encode()
+    content[LOG] = _replace_hidden(done.stdout + done.stderr, hidden)[-LONGEST_LOG:].encode()
     for path, ours in sorted(files.items()):
         content[f"{FILES}/{path.relative_to(top).as_posix()}"] = _text(path, files) if ours else path.read_bytes()
     path = target or Path(f"{scene.stem}.repeat.zip")
@@ -88,7 +90,7 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
         facts, log = _unpack(path, folder)
         environment = {**os.environ, "FLEXCLEAR_RESULTS": str(folder / "results")}
         done, digest = _run(folder / FILES / facts["scene"], facts["settings"], environment)
-        output = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST_LOG:]
+        output = _replace_hidden(done.stdout + done.stderr, _hidden_words(folder / FILES))[-LONGEST_LOG:]
     differences = [f"the run ended with exit code {done.returncode} here, with {facts['exit_code']} there"]
     if digest and facts.get("run"):
         differences += [
@@ -167,7 +169,7 @@ def _run(
         return done, digest_of(dataset) if dataset.is_file() else ""
 
 
-def _hidden(top: Path) -> dict[str, str]:
+def _hidden_words(top: Path) -> dict[str, str]:
     """Return the folders of this machine and the words that replace them, the longest first."""
     places = {str(top): ".", str(results_root()): "<results>", str(kernel_root()): "<kernels>"}
     places |= {str(TREE): "<flexclear>", sys.prefix: "<python>", sys.base_prefix: "<python>"}
@@ -175,7 +177,7 @@ def _hidden(top: Path) -> dict[str, str]:
     return {where: places[where] for where in sorted(places, key=len, reverse=True) if len(where) > 1}
 
 
-def _without(text: str, hidden: Mapping[str, str]) -> str:
+def _replace_hidden(text: str, hidden: Mapping[str, str]) -> str:
     for where, word in hidden.items():
         text = text.replace(where, word)
     return text

@@ -8,7 +8,7 @@ import sys
 from flexclear.scene import lines
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
-from flexclear.stages.show import shown
+from flexclear.stages.show import show_start
 from flexclear.stages.workplace import open_workplace
 from flexclear.system.errors import InputError
 
@@ -45,7 +45,7 @@ def command(options: argparse.Namespace) -> int:
     for name in options.scenes:
         scene = scenes.load_by_name(name, options.set)
         scenes.examine(scene, options.set)
-        files, refused = shown(scene, quiet=options.quiet or options.json)
+        files, refused = show_start(scene, quiet=options.quiet or options.json)
         made[scene.name] = [str(file) for file in files]
         if refused is not None:
             print(f"flexclear: {lines.with_line_number(refused)}", file=sys.stderr)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from flexclear.artifacts.labelled import Labelled, LabelledArrays
-from flexclear.artifacts.schema import incomplete
+from flexclear.artifacts.schema import mark_incomplete
 from flexclear.dynamics.events import phases
 from flexclear.dynamics.record.dataset import recorded, warnings
 from flexclear.dynamics.run.progress_rate import Judges
@@ -48,5 +48,5 @@ class SingleRun:
 
     def _recorded(self, done: Run) -> LabelledArrays:
         if done.stopped:
-            raise stopping.error(done.stopped, incomplete(recorded(done), done.stopped))
+            raise stopping.error(done.stopped, mark_incomplete(recorded(done), done.stopped))
         return recorded(done)

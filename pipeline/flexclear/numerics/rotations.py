@@ -21,7 +21,7 @@ _EQUAL = 1e-6
 OFF_AXIS = 1e-3
 
 
-def first_largest(values: np.ndarray, axis: int = -1) -> np.ndarray:
+def index_of_largest(values: np.ndarray, axis: int = -1) -> np.ndarray:
     """Return the index of the largest of values >= 0 along an axis; of values equal up to rounding, the first.
 
     Rounding differs between processors, and must not decide the choice.

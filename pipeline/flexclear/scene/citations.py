@@ -32,11 +32,11 @@ def docstring(thing: Any) -> str | None:
     module = sys.modules.get(getattr(thing, "__module__", None) or thing.__name__)
     path = getattr(module, "__file__", None)
     name = "" if module is thing else getattr(thing, "__qualname__", getattr(thing, "__name__", None))
-    return _written(path).get(name) if path and path.endswith(".py") and name is not None else None
+    return _docstrings_of(path).get(name) if path and path.endswith(".py") and name is not None else None
 
 
 @cache
-def _written(path: str) -> dict[str, str | None]:
+def _docstrings_of(path: str) -> dict[str, str | None]:
     """Return the docstrings of a source file by qualified name; the module has the empty name."""
     with open(path, encoding="utf-8") as file:
         tree = ast.parse(file.read())

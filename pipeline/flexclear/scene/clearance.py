@@ -98,7 +98,7 @@ class Hertz(_Elastic):
     law: Literal["hertz"]
 
     @model_validator(mode="after")
-    def _lossless(self) -> Self:
+    def _check_restitution(self) -> Self:
         if self.delivered_restitution not in (None, 1.0):
             raise ValueError(
                 f"the law 'hertz' has no loss and cannot deliver a restitution of {self.delivered_restitution:g}; "
@@ -267,7 +267,7 @@ class LuGre(_Friction):
     """sigma_2 [s/m], over the normal force"""
 
     @model_validator(mode="after")
-    def _passive(self) -> Self:
+    def _check_passivity(self) -> Self:
         _not_above(self.dynamic, self.static)
         # the damping fades as exp(-(v/v_stribeck)^2); its v-fold is then at most 0.4289 v_stribeck sigma_1, and
         # the law takes energy only while that stays below 4 mu (Barahanov & Ortega 2000, for constant damping)

@@ -50,7 +50,7 @@ class PathDrive(Part):
     N m)"""
 
     @model_validator(mode="after")
-    def _prescribes(self) -> Self:
+    def _check_components(self) -> Self:
         if not list(self.components()):
             raise ValueError("a path must prescribe at least one component of position or rotation")
         turning = self.rotation.laws() if self.rotation is not None else {}

@@ -132,7 +132,8 @@ def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) ->
     if exponents is not None and not _same_units(exponents, needed):
         turned = "; rad is a unit: divide by 1 rad" if _same_units((*exponents[:3], 0.0), needed) else ""
         raise ValueError(
-            f"its value is in {units.si(exponents)}, but {units.a(dimension)} [{units.si(needed)}] is expected{turned}"
+            f"its value is in {units.si(exponents)}, but {units.with_article(dimension)} [{units.si(needed)}] is "
+            f"expected{turned}"
         )
 
 
@@ -229,7 +230,7 @@ def postfix(
                 own = steps(first) + [step for one in more for step in (*steps(one), name)]
                 own += [] if more else [name]
             case _:
-                raise _misread(text)
+                raise _misread_error(text)
         return own + [step for right, operator in reversed(rights) for step in (*steps(right), operator)]
 
     try:
@@ -237,7 +238,7 @@ def postfix(
     except (RecursionError, MemoryError):
         raise ValueError(f"'{_shorten(text)}' is too long or too deeply nested") from None
     except SyntaxError:
-        raise _misread(text) from None
+        raise _misread_error(text) from None
 
 
 #: characters of an expression that a message shows
@@ -252,7 +253,7 @@ def _as_python(text: str) -> tuple[list[str], list[re.Match[str]]]:
     while place < len(text):
         token = _TOKEN.match(text, place)
         if token is None or (token["operator"] == ")" and words[-1:] == [","]):
-            raise _misread(text)
+            raise _misread_error(text)
         place = token.end()
         if token["operator"]:
             words.append(token["operator"].replace("^", "**"))
@@ -306,7 +307,7 @@ def _shorten(text: str) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]} ..."
 
 
-def _misread(text: str) -> ValueError:
+def _misread_error(text: str) -> ValueError:
     return ValueError(
         f"'{_shorten(text)}' is not a quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or combine "
         "them with + - * / ^, parentheses, functions such as norm(...) and numbers with units, spaces around + and -"

@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from flexclear.numerics.axes import check_axes, check_axis
-from flexclear.scene.units import a, components, quantity
+from flexclear.scene.units import components, quantity, with_article
 
 if TYPE_CHECKING:
     import numpy as np
@@ -44,7 +44,7 @@ class Measure:
         if not self.vector:
             return quantity(value, self.dimension)
         if not isinstance(value, (list, tuple)) or len(value) != 3:
-            raise ValueError(f"expected three components [x, y, z], each {a(self.dimension)}")
+            raise ValueError(f"expected three components [x, y, z], each {with_article(self.dimension)}")
         return tuple(components(value, self.dimension))
 
 

@@ -25,7 +25,7 @@ from flexclear.scene.expression import (
     require_used,
 )
 from flexclear.scene.loads import EXPRESSIONS, JointExpression, LineExpression, PointExpression
-from flexclear.scene.owners import turns
+from flexclear.scene.owners import is_angle
 from flexclear.scene.parts import FlexibleBody
 from flexclear.scene.quantity import KINDS, Quantity, read_expression
 from flexclear.scene.tables import LookupTable
@@ -83,7 +83,7 @@ def formula(scene: Any, name: str) -> Formula | None:
     load = scene.load[name]
     if not isinstance(load, EXPRESSIONS):
         return None
-    dimension = "torque" if isinstance(load, JointExpression) and turns(scene, load) else "force"
+    dimension = "torque" if isinstance(load, JointExpression) and is_angle(scene, load) else "force"
     vector = isinstance(load, PointExpression) and isinstance(load.force, str)
     numbers, reads, codes = list[float](), list[tuple[str, str]](), list[str]()
     for text, steps in expressions_of_load(scene, load):
@@ -138,7 +138,7 @@ def laws_by_expression(scene: Any) -> Iterator[tuple[str, Any, dict[str, bool]]]
                 yield f"joint.{name}", law, {}
     for name, stop in scene.stop.items():
         if stop.normal.law == "expression":
-            yield f"stop.{name}", stop.normal, {"turning": turns(scene, stop)}
+            yield f"stop.{name}", stop.normal, {"turning": is_angle(scene, stop)}
 
 
 def _check(scene: Any, step: Any) -> None:

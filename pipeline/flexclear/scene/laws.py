@@ -137,7 +137,7 @@ class Spline(Part):
     derivative zero; for degree 5 second, too); 'periodic'. The points must cover the run"""
 
     @model_validator(mode="after")
-    def _drawable(self) -> Self:
+    def _check_curve(self) -> Self:
         if len(self.time) != len(self.value):
             raise ValueError(f"each time needs one value; {len(self.time)} times have {len(self.value)} values")
         _check_points(self.time, self.degree, self.ends)
@@ -192,7 +192,7 @@ class Table(Part):
         return {**data, "file": path.name, "points": read_points(path, data["time"], data["value"])}
 
     @model_validator(mode="after")
-    def _drawable(self) -> Self:
+    def _check_curve(self) -> Self:
         _check_points([t for t, _ in self.points], self.degree, self.ends)
         if self.ends == "periodic" and self.points[0][1] != self.points[-1][1]:
             raise ValueError(
@@ -210,7 +210,7 @@ class Sum(Part):
     """the laws that are added"""
 
     @model_validator(mode="after")
-    def _countable(self) -> Self:
+    def _check_pieces(self) -> Self:
         if _count(self) * len(self.laws) > MOST_SUMMED:
             raise ValueError(f"a sum of {len(self.laws)} laws takes at most {MOST_SUMMED // len(self.laws)} pieces")
         return self
@@ -255,7 +255,7 @@ class Repeated(Part):
     """law that is repeated"""
 
     @model_validator(mode="after")
-    def _countable(self) -> Self:
+    def _check_pieces(self) -> Self:
         _check_count(self)
         return self
 
@@ -287,7 +287,7 @@ class Expression(Part):
     """interval in which the expression is used, for expressions in pieces"""
 
     @model_validator(mode="after")
-    def _lasts(self) -> Self:
+    def _check_duration(self) -> Self:
         if self.end is not None and not self.start < self.end:
             raise ValueError(f"it must end after it starts; start = {self.start:g} s, end = {self.end:g} s")
         return self

@@ -16,7 +16,7 @@ from flexclear.scene.fields import LONGEST_NAME
 from flexclear.scene.limits import check_parts
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
-from flexclear.scene.segments import cut
+from flexclear.scene.segments import cut_segments
 from flexclear.scene.solver import close_choice
 from flexclear.scene.toml_files import read_toml
 from flexclear.scene.units import any_quantity
@@ -116,7 +116,7 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
 def _validate_scene(table: dict[str, Any], where: Path) -> Scene:
     """Return the scene in a table; validation errors, and requests beyond `[limits]`, are reported with this path."""
     try:
-        scene = Scene.model_validate(pieces := cut(table, str(where)))
+        scene = Scene.model_validate(pieces := cut_segments(table, str(where)))
         scene._whole = None if pieces.get("body") == table.get("body") else table
         return scene
     except ValidationError as error:

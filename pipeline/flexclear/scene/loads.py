@@ -159,7 +159,7 @@ class SpringDamper(Part):
     """length at which the spring force is zero"""
 
     @model_validator(mode="after")
-    def _acts(self) -> Self:
+    def _check_action(self) -> Self:
         if self.stiffness == 0.0 and self.damping == 0.0:
             raise ValueError("a spring-damper needs a stiffness, a damping, or both; it has neither")
         if self.stiffness > 0.0 and self.free_length is None:
@@ -286,7 +286,7 @@ class Bushing(Part):
     """six numbers on the diagonal, or a symmetric, positive semidefinite 6x6 matrix; any with `symmetric = false`"""
 
     @model_validator(mode="after")
-    def _acts(self) -> Self:
+    def _check_action(self) -> Self:
         if self.stiffness == NOTHING and self.damping == NOTHING:
             raise ValueError("a bushing needs a stiffness, a damping, or both; it has neither")
         return self

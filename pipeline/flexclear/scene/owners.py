@@ -31,7 +31,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         scene.pairs(),
         _still(name for name, body in scene.body.items() if not isinstance(body, Ground)),
     )
-    stops = {f"{name}.{end}": turns(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}
+    stops = {f"{name}.{end}": is_angle(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}
     controllers = {name: load for name, load in forces.items() if isinstance(load, (Pid, SampledPid))}
     modes = {name: body.modes.count for name, body in scene.flexible().items()}
     unread = {name for name, mesh in scene.recipes().items() if not mesh}
@@ -41,13 +41,13 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         "joint": _still(scene.joint),
         "coordinate": _coordinates(scene),
         "drive": dict(_drives(scene)),
-        "controller": {name: turns(scene, load) for name, load in controllers.items()},
+        "controller": {name: is_angle(scene, load) for name, load in controllers.items()},
         "gear": {name: _is_angle(scene, gear.second) for name, gear in scene.gear.items()},
         "load": {name: _measures_angle(scene, load) for name, load in forces.items()},
         "bushing": _still(name for name, load in forces.items() if isinstance(load, Bushing)),
         "contact": _still(contacts) | stops,
-        "rubbing": _still(scene.rubbing()),
-        "worn": _still(scene.worn()),
+        "rubbing": _still(scene.joints_with_friction()),
+        "worn": _still(scene.wearing_joints()),
         "mode": _still(f"{n}.{k}" for n, c in modes.items() if isinstance(c, int) for k in range(1, c + 1)),
         "section": _still(scene.output.stress or ()),
         "gauge": _still(n for body in scene.output.stress or () for n in (body, *scene.output.gauge_names(body))),
@@ -105,7 +105,7 @@ def _drives(scene: Any) -> Iterator[tuple[str, bool]]:
         if isinstance(drive, PathDrive):
             yield from ((f"{name}.{part}", part.startswith("rotation")) for part, _ in drive.components())
         else:
-            yield name, turns(scene, drive)
+            yield name, is_angle(scene, drive)
     for name, event in scene.event.items():
         if event.kind == "lock":
             yield from ((held, turning) for held, (_, turning) in locked_coordinates(scene, name, event).items())
@@ -118,7 +118,7 @@ def locked_coordinates(scene: Any, name: str, event: Any) -> dict[str, tuple[str
     return {f"{name}.{c}" if len(known) > 1 else name: (c, turning) for c, turning in known.items()}
 
 
-def turns(scene: Any, part: Any) -> bool:
+def is_angle(scene: Any, part: Any) -> bool:
     """Return True when the coordinate of a part with `joint` and `coordinate` is an angle."""
     joint = scene.joint.get(part.joint)
     known = COORDINATES.get(joint.type, {}) if joint is not None else {}
@@ -134,4 +134,4 @@ def _is_angle(scene: Any, text: str) -> bool:
 def _measures_angle(scene: Any, load: Any) -> bool:
     if getattr(load, "measured", None):
         return _is_angle(scene, load.measured)
-    return hasattr(load, "joint") and turns(scene, load)
+    return hasattr(load, "joint") and is_angle(scene, load)

@@ -319,7 +319,7 @@ class IdealJoint(Part):
     """friction by the force that the joint carries; default: none"""
 
     @model_validator(mode="after")
-    def _rubs(self) -> Self:
+    def _check_friction(self) -> Self:
         if self.friction is not None:
             require_fitting(self.type, self.friction)
         return self
@@ -377,7 +377,7 @@ class Gear(Part):
     """a number; between a translation and a rotation a length per angle ("10 mm/rad") or an angle per length"""
 
     @model_validator(mode="after")
-    def _two(self) -> Self:
+    def _check_coordinates(self) -> Self:
         if self.first == self.second:
             raise ValueError(f"a gear couples two coordinates; first and second are both '{self.first}'")
         return self

@@ -76,6 +76,6 @@ class Plan:
     constant: tuple[str, ...] = ()
 
     @property
-    def gone(self) -> tuple[Effect, ...]:
+    def removed_effects(self) -> tuple[Effect, ...]:
         """The effects that the plan removes."""
         return tuple(d.effect for d in self.decisions if not d.kept)

@@ -10,7 +10,7 @@ from flexclear.scene.clearance import ClearancePrismatic
 from flexclear.scene.drives import JointDrive
 from flexclear.scene.laws import Constant, Harmonic, Piecewise, Repeated, Spline, Step, Sum
 from flexclear.scene.loads import Pid, SampledPid
-from flexclear.scene.owners import turns
+from flexclear.scene.owners import is_angle
 from flexclear.scene.parts import Ground, RigidBody
 from flexclear.system.errors import InputError
 
@@ -29,7 +29,7 @@ DEGREES, FEWEST_DEGREES = 5.0, 30.0
 UNITS = 'bare numbers are SI; with a unit they are text, as "0.2 mm" or "100 kg mm^2"'
 
 
-def implausible(scene: Scene) -> list[InputError]:
+def implausible_values(scene: Scene) -> list[InputError]:
     """Return implausible values, located as validation errors are; none of them is refused."""
     checks = (_clearances, _pins, _bearings, _inertias, _masses, _intervals, _angles, _gains)
     return [warning for check in checks for warning in check(scene)]
@@ -152,17 +152,17 @@ def _intervals(scene: Scene) -> Iterator[InputError]:
 def _angles(scene: Scene) -> Iterator[InputError]:
     """Yield bare numbers of angles that look like degrees."""
     for name, drive in scene.drive.items():
-        if isinstance(drive, JointDrive) and turns(scene, drive):
+        if isinstance(drive, JointDrive) and is_angle(scene, drive):
             yield from _degrees(scene, f"drive.{name}.law", _angles_of(drive.law))
         elif not isinstance(drive, JointDrive):
             for part, law in drive.components():
                 if part.startswith("rotation"):
                     yield from _degrees(scene, f"drive.{name}.{part}", _angles_of(law))
     for name, load in scene.load.items():
-        if isinstance(load, (Pid, SampledPid)) and load.measured is None and turns(scene, load):
+        if isinstance(load, (Pid, SampledPid)) and load.measured is None and is_angle(scene, load):
             yield from _degrees(scene, f"load.{name}.reference", _angles_of(load.reference))
     for name, stop in scene.stop.items():
-        if turns(scene, stop):
+        if is_angle(scene, stop):
             for end in stop.ends:
                 yield from _degrees(scene, f"stop.{name}.{end}", [getattr(stop, end)])
 

@@ -10,7 +10,9 @@ def sources(table: Mapping[str, Any], path: str = "") -> dict[str, str]:
     """Return key path -> text of every `source` at and below a table; a text is at the path of its table or key."""
     sources: dict[str, str] = {}
     for where, source in _sources(table, path):
-        sources |= {where: source} if isinstance(source, str) else {_below(where, key): t for key, t in source.items()}
+        sources |= (
+            {where: source} if isinstance(source, str) else {_path_below(where, key): t for key, t in source.items()}
+        )
     return sources
 
 
@@ -19,7 +21,7 @@ def path_of_wrong_source(table: Mapping[str, Any]) -> str | None:
     for where, source in _sources(table, ""):
         texts = source.values() if isinstance(source, dict) else [source]
         if not all(isinstance(text, str) for text in texts):
-            return _below(where, "source")
+            return _path_below(where, "source")
     return None
 
 
@@ -33,10 +35,10 @@ def _sources(node: Any, where: str) -> Iterator[tuple[str, Any]]:
         items = ((number, value) for number, value in enumerate(node))
     for key, value in items:
         if isinstance(value, (dict, list, tuple)):  # most entries of lists are numbers
-            yield from _sources(value, _below(where, str(key)))
+            yield from _sources(value, _path_below(where, str(key)))
 
 
-def _below(where: str, key: str) -> str:
+def _path_below(where: str, key: str) -> str:
     return f"{where}.{key}" if where else key
 
 
@@ -45,11 +47,11 @@ def assumed_values(sources: dict[str, str]) -> dict[str, str]:
     return {where: text for where, text in sources.items() if text.startswith("assumed")}
 
 
-def without(node: Any) -> Any:
+def without_sources(node: Any) -> Any:
     """Return a table without its sources, and without the file names of laws whose numbers have been read."""
     if isinstance(node, dict):
         read = node.get("type") == "table" and "points" in node
-        return {k: "" if read and k == "file" else without(v) for k, v in node.items() if k != "source"}
+        return {k: "" if read and k == "file" else without_sources(v) for k, v in node.items() if k != "source"}
     # most lists contain only numbers
     nested = isinstance(node, list) and any(isinstance(item, (dict, list)) for item in node)
-    return [without(item) for item in node] if nested else node
+    return [without_sources(item) for item in node] if nested else node

@@ -24,11 +24,11 @@ JOINTS = (*product(("drive", "load", "stop"), ("joint", "actuators")), ("gear", 
 
 def dangling_names(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:
     """Return an error for every name in a composed scene table that does not exist; `path` opens each location."""
-    frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
-    joints = [name for name, _ in _tables(table.get("joint"))]
+    frames = {name: _frames(body, recipe) for name, body in _tables_of_family(table.get("body"))}
+    joints = [name for name, _ in _tables_of_family(table.get("joint"))]
     errors: list[InputError] = []
     for where, name in _references(table, FRAMES):
-        errors += _frame(f"{path} [{where}]", name, frames)
+        errors += _frame_errors(f"{path} [{where}]", name, frames)
     for where, text in _references(table, JOINTS):
         name = text if where.endswith(".joint") else text.partition(".")[0]
         if name not in joints:
@@ -39,13 +39,13 @@ def dangling_names(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[
             errors.append(
                 InputError(f"{path} [ensemble.bodies]", f"there is no body '{name}'", suggestion(name, frames))
             )
-    for name, body in _tables(table.get("body")):
-        errors += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
+    for name, body in _tables_of_family(table.get("body")):
+        errors += _interface_errors(f"{path} [body.{name}.modes", body, frames[name])
         errors += _files(f"{path} [body.{name}.geometry", body)
     return errors
 
 
-def _tables(family: object) -> Iterator[tuple[str, dict[str, Any]]]:
+def _tables_of_family(family: object) -> Iterator[tuple[str, dict[str, Any]]]:
     if isinstance(family, dict):
         yield from ((name, part) for name, part in family.items() if isinstance(part, dict))
 
@@ -58,7 +58,7 @@ def _frames(body: Mapping[str, Any], recipe: Recipe) -> Collection[str] | None:
     return list(frames) if isinstance(frames, dict) else None
 
 
-def _frame(where: str, name: str, frames: Mapping[str, Collection[str] | None]) -> list[InputError]:
+def _frame_errors(where: str, name: str, frames: Mapping[str, Collection[str] | None]) -> list[InputError]:
     body, _, frame = name.partition(".")
     if not frame:
         return []  # validation reports a frame without its body
@@ -70,7 +70,7 @@ def _frame(where: str, name: str, frames: Mapping[str, Collection[str] | None]) 
     return [InputError(where, f"'{name}': body '{body}' has no frame '{frame}'", suggestion(frame, list(known)))]
 
 
-def _interfaces(where: str, body: Mapping[str, Any], frames: Collection[str] | None) -> list[InputError]:
+def _interface_errors(where: str, body: Mapping[str, Any], frames: Collection[str] | None) -> list[InputError]:
     modes = body.get("modes")
     if frames is None or not isinstance(modes, dict):
         return []
@@ -99,5 +99,5 @@ def _texts(value: object) -> list[str]:
 
 def _references(table: Mapping[str, Any], keys: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
     for family, key in keys:
-        for name, part in _tables(table.get(family)):
+        for name, part in _tables_of_family(table.get(family)):
             yield from ((f"{family}.{name}.{key}", text) for text in _texts(part.get(key)))

@@ -47,7 +47,7 @@ class TimeSpan(Part):
     """times at which the run begins and ends"""
 
     @model_validator(mode="after")
-    def _forward(self) -> Self:
+    def _check_order(self) -> Self:
         if not self.end > self.start:
             raise ValueError(f"time.end = {self.end} s must lie after time.start = {self.start} s")
         return self
@@ -112,7 +112,7 @@ class Accuracy(Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _flat(cls, table: Any) -> Any:
+    def _with_quantities(cls, table: Any) -> Any:
         plain = {"allow_missed", "by_need", "source"}
         if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
@@ -142,7 +142,7 @@ class View(Part):
     """factor by which films run slower around impacts; default: 8; 1 runs evenly"""
 
     @model_validator(mode="after")
-    def _points(self) -> Self:
+    def _check_directions(self) -> Self:
         for direction in (self.direction, self.up):
             if direction is not None and not any(direction):
                 raise ValueError("a direction must not have length zero")
@@ -426,7 +426,7 @@ class Scene(Part):
         pairs = ((name, pair) for name, joint in self.contacts().items() for pair in joint.pairs.items())
         return {f"{name}.{own}" if own else name: pair for name, (own, pair) in pairs}
 
-    def worn(self) -> dict[str, Clearance]:
+    def wearing_joints(self) -> dict[str, Clearance]:
         """Return the joints with clearance whose wear is computed, by name."""
         return {n: j for n, j in self.contacts().items() if getattr(j, "wear", None) is not None}
 
@@ -434,7 +434,7 @@ class Scene(Part):
         """Return the names of all ends of stops, as in records."""
         return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
 
-    def rubbing(self) -> dict[str, IdealJoint]:
+    def joints_with_friction(self) -> dict[str, IdealJoint]:
         """Return the ideal joints with friction, by name."""
         return {n: j for n, j in self.joint.items() if isinstance(j, IdealJoint) and j.friction is not None}
 

@@ -30,7 +30,7 @@ BODIES = (("ensemble", "bodies"), ("sections", "bodies"), ("output", "stress"), 
 RODS = ("straight-beam", "segmented-beam")
 
 
-def cut(table: Mapping[str, Any], where: str) -> dict[str, Any]:
+def cut_segments(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Return a scene's table with segments in the places of the bodies that ask for them.
 
     Raises InputError, at `where`, for a recipe that is no rod or has too few elements, and for names that are taken.

@@ -71,7 +71,7 @@ class Branch(OnCoordinate):
     """1 for the branch on which the coordinate grows most; -1 for that on which it falls most"""
 
 
-def _several(value: Any) -> Any:
+def _as_tuple(value: Any) -> Any:
     """Return a single choice, written without a list, as a tuple."""
     return (value,) if isinstance(value, (Mapping, Branch)) else value
 
@@ -97,7 +97,7 @@ class Start(Part):
     modal: dict[PartName, ModalStart] = Field(default_factory=dict)
     """starts of flexible bodies, by name"""
     branch: Annotated[
-        tuple[Branch, ...], BeforeValidator(_several, json_schema_input_type=Branch | tuple[Branch, ...])
+        tuple[Branch, ...], BeforeValidator(_as_tuple, json_schema_input_type=Branch | tuple[Branch, ...])
     ] = ()
     """in a change point, the branch that the motion takes; with several loops a list, each entry chooses among the
     branches that are left"""

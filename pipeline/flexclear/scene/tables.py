@@ -14,7 +14,7 @@ from flexclear.scene.units import unit
 MOST_POINTS = 5_000
 
 
-def _alone(value: Any) -> Any:
+def _as_tuple(value: Any) -> Any:
     return (value,) if isinstance(value, (dict, Column)) else value
 
 
@@ -29,7 +29,7 @@ class LookupTable(Part):
     """name of the CSV file"""
     of: Annotated[
         tuple[Column, ...],
-        BeforeValidator(_alone, json_schema_input_type=Column | tuple[Column, ...]),
+        BeforeValidator(_as_tuple, json_schema_input_type=Column | tuple[Column, ...]),
         Field(min_length=1, max_length=2),
     ]
     """column of the quantity, or the columns of two, every pair of whose values has a row"""
@@ -46,7 +46,7 @@ class LookupTable(Part):
         """Read the file unless its numbers are given; afterwards only its name is stored."""
         if not isinstance(data, dict) or "points" in data or not isinstance(data.get("file"), str):
             return data
-        columns = [*(_alone(data.get("of")) or ()), data.get("value")]
+        columns = [*(_as_tuple(data.get("of")) or ()), data.get("value")]
         if not all(isinstance(one, dict) and isinstance(one.get("unit"), str) for one in columns):
             return data
         path, factors = Path(data["file"]), [(unit(one["unit"]) or (1.0, ""))[0] for one in columns]
@@ -59,7 +59,7 @@ class LookupTable(Part):
         return {**data, "file": path.name, "points": points}
 
     @model_validator(mode="after")
-    def _interpolates(self) -> Self:
+    def _check_points(self) -> Self:
         if any(len(row) != len(self.of) + 1 for row in self.points):
             raise ValueError(f"each point of {self.file} has {len(self.of) + 1} numbers")
         sides = self.axes()

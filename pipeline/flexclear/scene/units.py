@@ -192,7 +192,7 @@ def coefficient(value: object, dimension: str, order: int) -> float:
     if product is None or product[1] != (kg, m, s - order, rad):
         example = f"{_example(dimension)}/s^{order}".removesuffix("^1") if order else _example(dimension)
         raise ValueError(
-            f"'{value}' is the coefficient of t^{order} of {a(dimension)}: it has a unit such as {example}"
+            f"'{value}' is the coefficient of t^{order} of {with_article(dimension)}: it has a unit such as {example}"
         )
     return quantity(float(match[1]) * product[0], "number")
 
@@ -203,7 +203,7 @@ def quantity(value: object, dimension: str) -> float:
     Raises ValueError, in words, when the text is no quantity, the unit is unknown or belongs to another dimension, or
     the number is not finite, too large or too small.
     """
-    return _computable(_read_quantity(value, dimension), value)
+    return _check_finite(_read_quantity(value, dimension), value)
 
 
 def quantity_at(place: str, value: object, dimension: str) -> float:
@@ -223,11 +223,11 @@ def components(values: Iterable[object], dimension: str) -> list[float]:
     numbers = [_read_quantity(value, dimension) for value in given]
     if numbers:
         largest = max(range(len(numbers)), key=lambda k: abs(numbers[k]))
-        _computable(numbers[largest], given[largest])
+        _check_finite(numbers[largest], given[largest])
     return numbers
 
 
-def _computable(number: float, written: object) -> float:
+def _check_finite(number: float, written: object) -> float:
     if number != 0.0 and not 1.0 / LARGEST_NUMBER <= abs(number) <= LARGEST_NUMBER:
         bounds = f"{1.0 / LARGEST_NUMBER:g} to {LARGEST_NUMBER:g}"
         raise ValueError(f"{written!r} is outside of the supported range, {bounds} in SI units")
@@ -238,7 +238,7 @@ def _read_quantity(value: object, dimension: str) -> float:
     if type(value) is float and math.isfinite(value):  # nearly all values of a scene that is read again
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"expected {a(dimension)}, a number or text like '1 {_example(dimension)}'")
+        raise ValueError(f"expected {with_article(dimension)}, a number or text like '1 {_example(dimension)}'")
     if isinstance(value, str):
         match = _parts(value)
         if match is None:
@@ -249,9 +249,9 @@ def _read_quantity(value: object, dimension: str) -> float:
         number, written = float(match[1]), match[2]
         factor, factor_and_dimension = (1.0, dimension) if written is None else _known_unit(written, dimension, value)
         if factor_and_dimension != dimension:
-            rule = f"{a(dimension)} is expected, in {_known_units(dimension)}"
+            rule = f"{with_article(dimension)} is expected, in {_known_units(dimension)}"
             rule = "a number without a unit is expected" if dimension == "number" else rule
-            raise ValueError(f"'{value}' is {a(factor_and_dimension)}, but {rule}")
+            raise ValueError(f"'{value}' is {with_article(factor_and_dimension)}, but {rule}")
         result = number * factor
     else:
         result = float(value) if abs(value) <= sys.float_info.max else math.inf
@@ -282,7 +282,7 @@ def any_quantity(value: object) -> float | str:
         return f"{quantity(value, known[1])!r} {_example(known[1], factor=1.0)}"
     if match is None or product is None:
         raise ValueError(unknown_unit_message(written, str(value)))
-    return f"{_computable(float(match[1]) * product[0], value)!r} {si(product[1])}"
+    return f"{_check_finite(float(match[1]) * product[0], value)!r} {si(product[1])}"
 
 
 def unknown_unit_message(written: str, value: str = "") -> str:
@@ -300,11 +300,11 @@ def _known_unit(written: str, dimension: str, value: str) -> tuple[float, str]:
     if known is None:
         if _FRACTION.fullmatch(value.strip()):
             raise ValueError(unknown_unit_message(written, value))
-        raise ValueError(f"unknown unit '{written}'; {a(dimension)} is written in {_known_units(dimension)}")
+        raise ValueError(f"unknown unit '{written}'; {with_article(dimension)} is written in {_known_units(dimension)}")
     return known
 
 
-def a(dimension: str) -> str:
+def with_article(dimension: str) -> str:
     """Return the dimension with its article."""
     return f"{'an' if dimension[0] in 'aeiou' else 'a'} {dimension}"
 

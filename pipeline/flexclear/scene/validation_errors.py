@@ -92,14 +92,14 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
         keys, value = [*keys, _selecting_key(context)], context["tag"]
         message, remedy = f"there is no such {keys[-1]}", suggestion(str(value), types)
     if kind == "missing" and keys and isinstance(keys[-1], int):
-        keys, message = keys[:-1], f"has {_entries(keys[-1])}, and needs at least {keys[-1] + 1}"
+        keys, message = keys[:-1], f"has {_count_of_entries(keys[-1])}, and needs at least {keys[-1] + 1}"
     where = ".".join(str(key) for key in keys if key != "[key]")
     shows_value = isinstance(value, (str, int, float)) and kind not in ("missing", "union_tag_not_found")
     shown = f" (got {value!r})" if shows_value and (kind in BOUNDS or repr(value) not in message) else ""
     return InputError(f"{path} [{where}]" if where else str(path), f"{message}{shown}", remedy)
 
 
-def _entries(number: int) -> str:
+def _count_of_entries(number: int) -> str:
     return "1 entry" if number == 1 else f"{number or 'no'} entries"
 
 

@@ -83,7 +83,7 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
             listed.append(Effect(f"joint.{name}.clearance", CLEARANCE))
         if joint.friction is not None:
             listed.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if removable else ""))
-    listed += [Effect(f"joint.{name}.friction", "friction") for name in scene.rubbing()]
+    listed += [Effect(f"joint.{name}.friction", "friction") for name in scene.joints_with_friction()]
     for name, load in scene.load.items():
         if load.type in OF_THE_WORLD:
             listed.append(Effect(f"load.{name}", "gravity" if load.type == "gravity" else "friction"))
@@ -195,15 +195,15 @@ def _requests(scene: Scene, bare: Scene) -> dict[str, Any]:
         keys["ensemble"] = None
     if scene.accuracy is not None and scene.accuracy.quantities:
         table = scene.accuracy.model_dump(exclude_none=True)
-        table["quantities"] = {n: w for n, w in table["quantities"].items() if _has(n, owners)}
+        table["quantities"] = {n: w for n, w in table["quantities"].items() if _has_part(n, owners)}
         keys["accuracy"] = table if table["quantities"] else None
     if scene.view is not None and scene.view.watch is not None:
-        watched = [name for name in scene.view.watch if _has(name, owners)]
+        watched = [name for name in scene.view.watch if _has_part(name, owners)]
         keys |= {"view.watch": watched} if watched else {"view": None}
     return keys
 
 
-def _has(name: str, owners: dict[str, dict[str, bool]]) -> bool:
+def _has_part(name: str, owners: dict[str, dict[str, bool]]) -> bool:
     try:
         parse(name, owners)
     except ValueError:

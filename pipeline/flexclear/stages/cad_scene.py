@@ -37,7 +37,7 @@ def files(source: Path, folder: Path) -> tuple[dict[str, bytes], list[str]]:
     joined = {place for pair in joints for place, _ in pair}
     for name, mine in frames.items():  # of shafts only those in a joint: bosses and fillets are shafts, too
         frames[name] = {k: one for k, one in mine.items() if one.hole or f"{name}.{k}" in joined}
-    made = {f"{_word(source.stem) or 'part'}.toml": _scene(source, names, found, joints, frames).encode()}
+    made = {f"{_identifier(source.stem) or 'part'}.toml": _scene(source, names, found, joints, frames).encode()}
     path = Path(os.path.relpath(source.resolve(), folder.resolve())).as_posix()
     for k, (name, solid) in enumerate(zip(names, found, strict=True), start=1):
         made[f"{name}_mesh.toml"] = _recipe(path, k, solid, frames[name]).encode()
@@ -45,7 +45,7 @@ def files(source: Path, folder: Path) -> tuple[dict[str, bytes], list[str]]:
     return made, [f"{name} has no cylindrical hole or shaft: give it frames" for name in lonely]
 
 
-def _word(text: str) -> str:
+def _identifier(text: str) -> str:
     return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
 
 
@@ -53,7 +53,7 @@ def _names(given: list[str]) -> Iterator[str]:
     """Yield a name for each solid: that of its product, or part1, part2, ...; numbered where products are alike."""
     taken = {"ground"}
     for k, text in enumerate(given, start=1):
-        word = _word(text.rpartition("/")[2])
+        word = _identifier(text.rpartition("/")[2])
         word = f"part{k}" if not word or word.startswith("open_cascade") or word[0].isdigit() else word
         name = f"{word}_{k}" if word in taken else word
         taken.add(name)
@@ -79,7 +79,7 @@ def _joints(names: list[str], found: list[Solid]) -> tuple[list[tuple[Place, Pla
             ((f"{first}.{a}", one), (f"{second}.{b}", other))
             for a, one in frames[first].items()
             for b, other in frames[second].items()
-            if one.along(other) and (one.hole or other.hole) and _fits(one, other)
+            if one.along(other) and (one.hole or other.hole) and _fits_hole(one, other)
         ]
         # of several cylinders about one axis those that fit most closely
         for pair in sorted(pairs, key=lambda p: abs(p[0][1].radius - p[1][1].radius)):
@@ -92,7 +92,7 @@ def _bodies(pair: tuple[Place, Place]) -> set[str]:
     return {place.partition(".")[0] for place, _ in pair}
 
 
-def _fits(one: Round, other: Round) -> bool:
+def _fits_hole(one: Round, other: Round) -> bool:
     """Return True when a shaft is not larger than its hole; two holes take one pin, if they are about alike."""
     if one.hole and other.hole:
         return abs(one.radius - other.radius) < 0.2 * max(one.radius, other.radius)
@@ -111,7 +111,7 @@ def _scene(
     pivot = next(iter(frames[names[held]].items()), None) if not joints else None
     bound = {place.partition(".")[0] for pair in joints for place, _ in pair} | {names[held]}
     lines = [
-        f"# The solids of {_shown(source.name)} as rigid bodies of steel; lengths in m, axes of the file.",
+        f"# The solids of {_printable(source.name)} as rigid bodies of steel; lengths in m, axes of the file.",
         "# For a flexible body replace mass, com, inertia and frames by",
         '#   type = "flexible"',
         '#   mesh = "NAME_mesh.toml"',
@@ -132,7 +132,7 @@ def _scene(
         lines += [f"mass = {DENSITY * solid.volume!r}", f"com = {_vector(solid.centre)}"]
         lines += [f"inertia = {_symmetric(solid)}", "pose = {}"]
         for frame, one in frames[name].items():
-            lines += [f"{_frame(frame, one)}  # diameter {_mm(one)} mm, length {1e3 * one.length:.6g} mm"]
+            lines += [f"{_frame(frame, one)}  # diameter {_in_millimetres(one)} mm, length {1e3 * one.length:.6g} mm"]
         lines += ["frames.base = {}", ""] if name not in bound or (name == names[held] and not pivot) else [""]
     ends, kind = ("base", "fixed") if pivot is None else (pivot[0], "revolute")
     lines += _part("base", kind, "ground.base", f"{names[held]}.{ends}")
@@ -151,7 +151,7 @@ def _part(name: str, kind: str, first: str, second: str) -> list[str]:
 def _joint(k: int, a: str, one: Round, b: str, other: Round) -> list[str]:
     """Return a proposed joint; with a clearance where hole and shaft are drawn with different diameters."""
     (hole, outer), (shaft, inner) = ((a, one), (b, other)) if one.hole else ((b, other), (a, one))
-    clearance, sizes = outer.radius - inner.radius, f"of {_mm(outer)} and {_mm(inner)} mm"
+    clearance, sizes = outer.radius - inner.radius, f"of {_in_millimetres(outer)} and {_in_millimetres(inner)} mm"
     ideal = _part(f"pin{k}", "revolute", hole, shaft)
     if inner.hole:
         return [f"# Proposed: two coaxial holes, {sizes}; no pin is drawn.", *ideal]
@@ -209,7 +209,7 @@ def _symmetric(solid: Solid) -> list[list[float]]:
     return [[float(x) if abs(x) > 1e-12 * J.max() else 0.0 for x in row] for row in J]
 
 
-def _mm(one: Round) -> str:
+def _in_millimetres(one: Round) -> str:
     return f"{2e3 * one.radius:.6g}"
 
 
@@ -218,7 +218,7 @@ def _text(text: str) -> str:
     return json.dumps(text, ensure_ascii=True)
 
 
-def _shown(text: str) -> str:
+def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in text)
 
 

@@ -45,7 +45,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     split = {q.name: causes_of(q, points, runs, LOCATED, tightest) for q in chosen}
     title = params["title"]
     notes = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
-    notes += (*answer.undone(study),)
+    notes += (*answer.skipped_sentence(study),)
     study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
     result |= files("price", answer.price_list(study, f"What accuracy costs: {title}", notes))

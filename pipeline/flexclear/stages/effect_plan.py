@@ -105,15 +105,15 @@ def _static(body: FlexibleBody) -> int | None:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Return ``plan.nc`` with all decisions, its table and its chart; inputs are bundles, as in `task`."""
     from flexclear.post.answers import plan as shown
-    from flexclear.post.answers.effect_sizes import chart, stay
+    from flexclear.post.answers.effect_sizes import chart, staying_contacts_sentence
 
     dataset = shown.dataset(decide_plan(params, inputs, progress), params["title"], params["units"])
     types = {name: joint["type"] for name, joint in params["simulate"]["scene"]["joint"].items()}
-    dataset.attrs["staying"] = stay(variants.contacts_that_stay(types))
+    dataset.attrs["staying"] = staying_contacts_sentence(variants.contacts_that_stay(types))
     progress(None, "chart")
     requested = dict(zip(dataset["quantity"].values.tolist(), dataset["requested"].values.tolist(), strict=True))
     result: dict[str, Any] = {"nc": dataset} | files("plan", shown.table(dataset))
-    return result | chart("plan", shown.drawn(dataset), f"Effects that matter: {params['title']}", requested)
+    return result | chart("plan", shown.upper_bounds(dataset), f"Effects that matter: {params['title']}", requested)
 
 
 def decide_plan(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> Any:

@@ -134,9 +134,9 @@ def _files(
     params: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the files of a result. shown: the dataset of the chart."""
-    from flexclear.post.answers.effect_sizes import chart, stay
+    from flexclear.post.answers.effect_sizes import chart, staying_contacts_sentence
 
-    dataset.attrs["staying"] = stay(params["staying"])
+    dataset.attrs["staying"] = staying_contacts_sentence(params["staying"])
     return {"nc": dataset} | files(name, table(dataset)) | chart(name, shown, f"Effect sizes: {params['title']}")
 
 
@@ -173,7 +173,12 @@ def _error_of(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Ca
 
     def error(quantity: Quantity, until: float) -> float:
         own, tight = inputs.get("own"), inputs.get("tight")
-        if own is None or tight is None or not quantities.has(own, quantity) or not quantities.has(tight, quantity):
+        if (
+            own is None
+            or tight is None
+            or not quantities.has_quantity(own, quantity)
+            or not quantities.has_quantity(tight, quantity)
+        ):
             return 0.0
         return float(params["looser"]) * quantities.error(own, tight, quantity, until)
 

@@ -39,8 +39,8 @@ def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",
 
     made: dict[str, Callable[[], bytes]] = {
         ".csv": lambda: table(dataset, rows).to_csv().encode(),
-        ".parquet": lambda: _written(table(dataset, rows).to_parquet),
-        ".xlsx": lambda: _written(table(dataset, rows).to_excel),
+        ".parquet": lambda: _file_bytes(table(dataset, rows).to_parquet),
+        ".xlsx": lambda: _file_bytes(table(dataset, rows).to_excel),
         ".mat": lambda: _matlab(dataset),
         ".npz": lambda: _numpy(dataset),
     }
@@ -53,7 +53,7 @@ def _numpy(dataset: xr.Dataset) -> bytes:
 
     arrays = {str(name): array.values for name, array in dataset.variables.items()}
     plain = {name: values.astype(str) if values.dtype.kind in "UO" else values for name, values in arrays.items()}
-    return _written(lambda file: savez(file, allow_pickle=False, **plain))
+    return _file_bytes(lambda file: savez(file, allow_pickle=False, **plain))
 
 
 def _matlab(dataset: xr.Dataset) -> bytes:
@@ -62,10 +62,10 @@ def _matlab(dataset: xr.Dataset) -> bytes:
 
     arrays = {str(name): array.values for name, array in dataset.variables.items()}
     columns = {name: values.astype(object) if values.dtype.kind in "UO" else values for name, values in arrays.items()}
-    return _written(lambda file: savemat(file, columns, long_field_names=True))
+    return _file_bytes(lambda file: savemat(file, columns, long_field_names=True))
 
 
-def _written(write_to: Callable[[Any], object]) -> bytes:
+def _file_bytes(write_to: Callable[[Any], object]) -> bytes:
     from io import BytesIO
 
     file = BytesIO()

@@ -31,7 +31,7 @@ POLICY = (
 
 
 class Findings(Protocol):
-    """What `commands.check.examined` returns."""
+    """What `commands.check.examine` returns."""
 
     errors: list[FlexclearError]
     notes: list[str]
@@ -130,7 +130,7 @@ def follow(name: str, settings: Sequence[str], examine: Examine, workplace: Work
             refused, note = None, []
             try:
                 scene = scenes.load_by_name(name, settings)
-                view, refused = show.drawn(scene)
+                view, refused = show.start_in_file(scene)
                 title, views = show.title_of(scene), [show.figure(scene, view)]
             except FlexclearError:  # among those that `examine` returns
                 note = ["The view is that of the last version that can be drawn." if views else "Nothing can be drawn."]
@@ -143,7 +143,7 @@ def follow(name: str, settings: Sequence[str], examine: Examine, workplace: Work
             )
             if workplace is not None and sound:
                 try:
-                    with stopping.when(saved.again, "a file of the scene was saved"):
+                    with stopping.stop_when(saved.again, "a file of the scene was saved"):
                         film, now = _film(scene, workplace), []
                 except FlexclearError as error:
                     now = ["The film is that of the last version that ran."] if film else []

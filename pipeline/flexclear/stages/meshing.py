@@ -48,7 +48,7 @@ def params(
     more: dict[str, Any] = {"segment": list(segment)} if segment else {}
     if isinstance(table.get("shape"), dict) and table["shape"].get("type") == "step":
         more["gmsh"] = library_version("gmsh")
-    return {"recipe": provenance.without(table | changes)} | more
+    return {"recipe": provenance.without_sources(table | changes)} | more
 
 
 def sources(recipe: Path, where: str = "") -> dict[str, str]:

@@ -23,7 +23,7 @@ from flexclear.post.pages import media
 from flexclear.post.plotting.table import as_html, from_markdown
 from flexclear.scene import lines
 from flexclear.scene.load import is_file, load_scene, scene_name, table_with_changes
-from flexclear.scene.plausibility import implausible
+from flexclear.scene.plausibility import implausible_values
 from flexclear.scene.quantity import KINDS, parse
 from flexclear.scene.references import dangling_names
 from flexclear.scene.registry import suggestion
@@ -272,7 +272,7 @@ def _check_rest(path: Path, settings: Sequence[str], errors: str) -> None:
     for family in ACTING:
         table[family] = {name: part for name, part in table.get(family, {}).items() if (family, name) not in wrong}
     left = {key: value for key, value in table.items() if key not in ("view", "accuracy", "event")}
-    with suppress(ValidationError, ResourceError), in_file(path):
+    with suppress(ValidationError, ResourceError), errors_in_file(path):
         simulation.check_parts(simulation.params(Scene.model_validate(left)))
 
 
@@ -295,7 +295,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
         try:
             graph = Graph(load_by_name(name, settings))
             examine(graph.scene, settings)
-            with in_file(graph.scene.path):
+            with errors_in_file(graph.scene.path):
                 graph.up_to("post")
             path = graph.scene.path
             by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
@@ -307,7 +307,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
 
 
 @contextmanager
-def in_file(path: Path | None) -> Iterator[None]:
+def errors_in_file(path: Path | None) -> Iterator[None]:
     """Add this file to the location of errors that have none."""
     try:
         yield
@@ -319,7 +319,7 @@ def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputEr
     """Return plausibility warnings about a scene; those about values from `settings` are located there."""
     changed = overrides(settings)
     warnings = []
-    for warning in implausible(scene):
+    for warning in implausible_values(scene):
         key = warning.place.partition("[")[2].rstrip("]")
         place = f"--set {key}" if key in changed else warning.place
         warnings.append(InputError(place, warning.problem, warning.remedy))

@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     from flexclear.scene.schema import Scene
 
 
-def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> tuple[list[Path], InputError | None]:
+def show_start(
+    scene: Scene, folder: Path | None = None, *, quiet: bool = False
+) -> tuple[list[Path], InputError | None]:
     """Write picture and page, and print where they are; return the files, and the start's error or None."""
-    with scenes.in_file(scene.path):
+    with scenes.errors_in_file(scene.path):
         view, refused = draw_start(scene)
     files = files_of(scene, view, Path.cwd() if folder is None else folder, quiet=quiet)
     if not quiet:
@@ -62,7 +64,7 @@ class Start(Page):
 
 def start(scene: Scene, folder: Path | None = None) -> Start:
     """Return the start pose of a scene; write picture and page where a folder is given.  Raises InputError."""
-    view, refused = drawn(scene)
+    view, refused = start_in_file(scene)
     if folder is not None:
         files_of(scene, view, folder)
     return Start(_page(scene, view), view, refused)
@@ -94,7 +96,7 @@ def _small(scene: Scene) -> str:
     from flexclear.post.render.sketch import sketch
 
     try:
-        return small_picture(png(sketch(drawn(scene)[0].drawn)))
+        return small_picture(png(sketch(start_in_file(scene)[0].drawn)))
     except FlexclearError:
         return ""
 
@@ -102,10 +104,10 @@ def _small(scene: Scene) -> str:
 notebook.PICTURES.append(_small)
 
 
-def drawn(scene: Scene) -> tuple[StartView, InputError | None]:
+def start_in_file(scene: Scene) -> tuple[StartView, InputError | None]:
     """Return the start pose as `draw_start` does, of a scene whose names are checked; errors say the file."""
     scenes.require_names(scene)
-    with scenes.in_file(scene.path):
+    with scenes.errors_in_file(scene.path):
         return draw_start(scene)
 
 
@@ -173,7 +175,7 @@ def _body(body: Any, recipe: Path) -> xr.Dataset:
     from flexclear.structure.modes import bundle
 
     table: dict[str, Any] = meshing.params(recipe)["recipe"]
-    return bundle.drawn(kind.build(table, recipe.parent, segment=body.segment))
+    return bundle.rigid_drawing(kind.build(table, recipe.parent, segment=body.segment))
 
 
 def _unplaced_bodies(scene: Scene) -> list[str]:

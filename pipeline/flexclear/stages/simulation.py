@@ -57,7 +57,7 @@ def params(
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.recipes():
         table["body"][body]["mesh"] = ""  # the reduced body comes as an input, whose digest is in the key
-    return {"scene": provenance.without(table)}
+    return {"scene": provenance.without_sources(table)}
 
 
 @given_arrays
@@ -132,7 +132,7 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[st
 @contextmanager
 def in_time(scene: Scene) -> Iterator[None]:
     """Stop the work inside this context when the scene's time limit is over."""
-    with stopping.until(scene.limits.time, scene.limits.time_words):
+    with stopping.stop_after(scene.limits.time, scene.limits.time_words):
         yield
 
 

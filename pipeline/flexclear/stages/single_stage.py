@@ -46,7 +46,7 @@ def single_stage(graph: Graph, stage: str, workplace: Workplace) -> list[Step]:
     above = [one for task in tasks.values() for one in task.inputs.values()]
     for state in states(above, workplace.store, workplace.sources):
         if state.record is None and state.task.stage in STAGES:
-            where, path = relative(_shown(root, state.task)), graph.scene.path
+            where, path = relative(_shown_path(root, state.task)), graph.scene.path
             why = f"is missing or out of date: {state.why[0]}"
             raise InputError(
                 where, why, f"make {state.task.stage} SCENE={relative(path) if path else graph.scene.name}"
@@ -58,12 +58,12 @@ def _step(graph: Graph, made: Made) -> Step:
     task, scene = made.task, graph.scene
     source = scene.recipes()[task.part] if task.stage == "mesh" else scene.path
     reads = [] if source is None else [Path(source)]
-    reads += [*task.files.values(), *(_shown(made.store.root, one) for one in task.inputs.values() if one.folder)]
+    reads += [*task.files.values(), *(_shown_path(made.store.root, one) for one in task.inputs.values() if one.folder)]
     return Step(
         task.part, reads, [made.folder / task.names.get(name, name) for name in made.record.files], made.dataset()
     )
 
 
-def _shown(root: Path, task: Task) -> Path:
+def _shown_path(root: Path, task: Task) -> Path:
     """Return where the dataset of a task is shown."""
     return root / task.folder / task.names["nc"]

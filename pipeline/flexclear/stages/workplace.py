@@ -154,7 +154,7 @@ class Workplace:
     def time_limit(self) -> AbstractContextManager[None]:
         """Return a context that stops the work inside when the command's time limit is over."""
         end, why = self.end
-        return stopping.until(None if end == math.inf else end - time.monotonic(), why)
+        return stopping.stop_after(None if end == math.inf else end - time.monotonic(), why)
 
 
 def open_workplace(options: argparse.Namespace | None = None) -> Workplace:

@@ -17,7 +17,7 @@ from flexclear.scene.provenance import assumed_values
 from flexclear.scene.variants import replaceable_contacts
 from flexclear.stages import derived_series
 from flexclear.stages.notebook import COST
-from flexclear.stages.scenes import in_file, pictures
+from flexclear.stages.scenes import errors_in_file, pictures
 from flexclear.stages.workplace import (
     Made,
     Workplace,
@@ -71,7 +71,7 @@ def of_scene(
     scene = graph.scene
     compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)
     if replaceable_contacts(scene) or scene.flexible():
-        with in_file(scene.path):
+        with errors_in_file(scene.path):
             compared = compare.bring([scene], workplace, "both")
     drawn = [task for what, task in graph.render.items() if what in SHOWN_MOTION]
     members = [graph.ensemble, graph.post] if graph.ensemble else []

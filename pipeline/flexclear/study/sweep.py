@@ -139,7 +139,9 @@ def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: 
         finally:
             sink.store()
             if folder is not None and large:
-                result = sweep_large.written(ready, workplace.store, sink.done, folder / f"{NAME}{sweep_large.SUFFIX}")
+                result = sweep_large.write_points(
+                    ready, workplace.store, sink.done, folder / f"{NAME}{sweep_large.SUFFIX}"
+                )
                 (folder / f"{NAME}.nc").unlink(missing_ok=True)
             else:
                 result = ready.dataset(sink.done)

@@ -83,7 +83,7 @@ def refuse(errors: Sequence[InputError]) -> None:
         raise errors[0] if len(errors) == 1 else InputErrors(list(errors))
 
 
-def together(makers: Iterable[Callable[[], Result]]) -> list[Result]:
+def all_or_errors(makers: Iterable[Callable[[], Result]]) -> list[Result]:
     """Return what the functions return; raise the input errors of all of them together, each once."""
     results, errors = list[Result](), dict[str, InputError]()
     for make in makers:
@@ -98,7 +98,7 @@ def together(makers: Iterable[Callable[[], Result]]) -> list[Result]:
 def errors_from(checks: Iterable[Callable[[], object]]) -> list[InputError]:
     """Return the input errors that the checks raise, each once."""
     try:
-        together(checks)
+        all_or_errors(checks)
     except InputError as error:
         return errors_of(error)
     return []

@@ -14,7 +14,7 @@ for _variable in VARIABLES:
     os.environ[_variable] = "1"  # also where the user set more, which would change the bytes
 
 
-def one() -> AbstractContextManager[Any]:
+def limit_to_one() -> AbstractContextManager[Any]:
     """Limit BLAS and OpenMP to one thread inside this context, also where NumPy was loaded earlier or with more."""
     from threadpoolctl import threadpool_limits
 

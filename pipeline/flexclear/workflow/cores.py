@@ -14,7 +14,7 @@ from flexclear.system.errors import StoppedError
 from flexclear.system.platforms import cores
 from flexclear.system.progress import Progress, silent
 
-__all__ = ["cores", "free", "meanwhile", "set_idle", "side_by_side", "width"]
+__all__ = ["cores", "free", "run_in_thread", "set_idle", "side_by_side", "width"]
 
 Result = TypeVar("Result")
 #: time of one wait for a thread, after which Ctrl-C is checked [s]: some systems do not interrupt a wait
@@ -78,7 +78,7 @@ class _GivenUpError(Exception):
 
 
 @contextmanager
-def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Result]]:
+def run_in_thread(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Result]]:
     """Run work (mostly compiled code) in a thread inside this context; yield the function that waits for its result.
 
     work: must call its progress callback from time to time, also while it waits; the call ends it when the context has

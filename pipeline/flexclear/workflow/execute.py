@@ -54,7 +54,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             load = store.arrays if hasattr(run, ARRAYS) else store.load
             data = {role: load(above) for role, above in inputs.items()}
             begun = store.path(task.stage, name, "part")
-            with threads.one(), journal.storage(begun.parent, begun.stem) as storage:
+            with threads.limit_to_one(), journal.storage(begun.parent, begun.stem) as storage:
                 product = run({**task.params, **task.context}, data, progress)
             changed = [fact for fact, value in contents(task).items() if known[fact] != value]
             if changed:

@@ -96,7 +96,7 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
     jobs: largest number of processes; default: the cores this process may use. On a request to stop (`stopping`), tasks
     that can leave partial results do so, and count as failures; after Ctrl-C, KeyboardInterrupt follows.
     """
-    store.sweep()
+    store.remove_leftovers()
     plan = _Plan(in_order(tasks), tuple(in_order(tasks)))
     _settle_fresh(plan, store, sources)
     if plan.waiting:
@@ -105,8 +105,8 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
             if store.last(task.folder, task.label) is not None:
                 store.mark_outdated(task.folder, task.label, UNFINISHED)
         monitor.start(len(plan.waiting))
-        width = min(jobs or cores.cores(), _width(plan.waiting))
-        with stopping.gently(monitor.say):
+        width = min(jobs or cores.cores(), _largest_concurrency(plan.waiting))
+        with stopping.request_at_interrupt(monitor.say):
             if width == 1:
                 _run_here(plan, store, sources, monitor)
             else:
@@ -123,7 +123,7 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
     return Outcome(plan.done, failures)
 
 
-def _width(tasks: list[Task]) -> int:
+def _largest_concurrency(tasks: list[Task]) -> int:
     """Return how many tasks can run concurrently at most: one per scene and part, exclusive tasks excluded."""
     return max(1, len({(t.scene, t.part) for t in tasks if not t.exclusive}))
 
@@ -248,7 +248,7 @@ def _submit(
             monitor.finish(name, failed=False)
             continue
         where = (store.root, sources.root, sources.memo)
-        with workers.lost():  # an idle worker may die
+        with workers.report_lost_worker():  # an idle worker may die
             future = pool.submit(_work, task, inputs, name, where, others_idle)
         running[future] = _Running(task, key, name)
 
@@ -303,7 +303,7 @@ def _work(
             last = time.monotonic()
             workers.report(name, fraction, text)
 
-    with stopping.busy():
+    with stopping.declare_task():
         return attempt(task, inputs, Store(root, say=partial(progress, None)), sources_of(source, memo), progress)
 
 

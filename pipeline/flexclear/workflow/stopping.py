@@ -70,7 +70,7 @@ def heed_requests() -> Iterator[None]:
 
 
 @contextmanager
-def busy() -> Iterator[None]:
+def declare_task() -> Iterator[None]:
     """Declare that this worker has a task inside this context."""
     global _busy
     _busy = True
@@ -80,16 +80,16 @@ def busy() -> Iterator[None]:
         _busy = False
 
 
-def until(seconds: float | None, why: str) -> AbstractContextManager[None]:
+def stop_after(seconds: float | None, why: str) -> AbstractContextManager[None]:
     """Request a stop inside this context after `seconds`; None sets no limit."""
     if seconds is None:
         return nullcontext()
     end = time.monotonic() + seconds
-    return when(lambda: time.monotonic() > end, why)
+    return stop_when(lambda: time.monotonic() > end, why)
 
 
 @contextmanager
-def when(due: Callable[[], bool], why: str) -> Iterator[None]:
+def stop_when(due: Callable[[], bool], why: str) -> Iterator[None]:
     """Request a stop inside this context once `due` returns True, which is asked often."""
     entry = (due, why)
     _conditions.append(entry)
@@ -100,7 +100,7 @@ def when(due: Callable[[], bool], why: str) -> Iterator[None]:
 
 
 @contextmanager
-def gently(say: Callable[[str], None]) -> Iterator[None]:
+def request_at_interrupt(say: Callable[[str], None]) -> Iterator[None]:
     """Treat the first Ctrl-C inside this context as a request to work that heeds requests; otherwise interrupt."""
     global _why
     if threading.current_thread() is not threading.main_thread():
@@ -123,7 +123,7 @@ def gently(say: Callable[[str], None]) -> Iterator[None]:
             signal.signal(signal.SIGINT, before)
 
 
-def obey(wait_for_signal: Callable[[], Any], why: Callable[[], str], unstoppable: Callable[[], None]) -> None:
+def obey_parent(wait_for_signal: Callable[[], Any], why: Callable[[], str], unstoppable: Callable[[], None]) -> None:
     """Let a worker stop when its parent requests it; `unstoppable` reports a task that does not heed requests."""
 
     def wait() -> None:

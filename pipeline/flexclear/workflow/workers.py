@@ -109,9 +109,11 @@ def _begin(channel: Channel | None) -> None:
     _channel = channel
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    threading.Thread(target=_watch, daemon=True).start()
+    threading.Thread(target=_watch_parent, daemon=True).start()
     if channel is not None:
-        stopping.obey(channel.await_stop, lambda: channel.why.value.decode(errors="replace"), channel.count_unstoppable)
+        stopping.obey_parent(
+            channel.await_stop, lambda: channel.why.value.decode(errors="replace"), channel.count_unstoppable
+        )
 
 
 def report(name: str, fraction: float | None, text: str) -> None:
@@ -120,7 +122,7 @@ def report(name: str, fraction: float | None, text: str) -> None:
         _channel.reports.put((name, fraction, text))
 
 
-def _watch() -> None:
+def _watch_parent() -> None:
     from multiprocessing import parent_process
 
     parent = parent_process()
@@ -143,7 +145,7 @@ def kill(workers: ProcessPoolExecutor) -> None:
 
 
 @contextmanager
-def lost() -> Iterator[None]:
+def report_lost_worker() -> Iterator[None]:
     """Convert the loss of a worker process, which the system may kill when memory is full, to a ResourceError."""
     from concurrent.futures.process import BrokenProcessPool
 

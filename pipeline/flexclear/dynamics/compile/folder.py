@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from flexclear.artifacts.disk import sweep
+from flexclear.artifacts.disk import remove_leftovers
 from flexclear.dynamics.compile.files import CODE, file_lock, remove_code
 from flexclear.dynamics.kernels import PLAIN
 from flexclear.system.errors import InputError
@@ -64,7 +64,7 @@ def processor() -> str:
 
 def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
     """Remove kernels unused for `unused` seconds, then the oldest beyond `largest` bytes; return their number."""
-    sweep(folder)
+    remove_leftovers(folder)
     files = [*folder.glob("flexclear_*.py"), *folder.glob(f"flexclear_routine_*{CODE}")]
     kernels = [(_used(path), path) for path in files]
     total, removed = 0, 0

@@ -22,7 +22,9 @@ BEARINGS: dict[str, tuple[tuple[int, int, int], ...]] = {
 
 
 def _laws(scene: Scene) -> list[str]:
-    return sorted({joint.friction.kind for joint in scene.rubbing().values() if joint.friction is not None})
+    return sorted(
+        {joint.friction.kind for joint in scene.joints_with_friction().values() if joint.friction is not None}
+    )
 
 
 JOINT_FRICTION = Effect(

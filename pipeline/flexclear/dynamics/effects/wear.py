@@ -9,7 +9,7 @@ from flexclear.dynamics.effects.effect import Effect
 
 WEAR = Effect(
     "wear",
-    lambda scene: () if scene.worn() else None,
+    lambda scene: () if scene.wearing_joints() else None,
     topology={"worn": "contact"},  # contacts with wear
     compose={"forces": {"contacts": "<contact.wear.wearing>({file.given[contacts]})"}},
     changeable=("joint.wear",),

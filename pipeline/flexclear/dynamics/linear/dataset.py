@@ -17,7 +17,7 @@ from flexclear.dynamics.record.dataset import attributes, recorded, subject
 from flexclear.dynamics.run.refusals import validity
 from flexclear.dynamics.run.run import Run
 from flexclear.dynamics.run.trajectory import Trajectory
-from flexclear.numerics.rotations import first_largest
+from flexclear.numerics.rotations import index_of_largest
 
 PARTS = ("real", "imaginary")
 
@@ -57,7 +57,7 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
     w, translation, rotation = w * phase, translation * phase[:, None, None], rotation * phase[:, None, None]
     size, parts = np.abs(value), list(energy)
     fraction = np.stack([energy[name] for name in parts], axis=1)
-    most = first_largest(fraction, axis=1)
+    most = index_of_largest(fraction, axis=1)
     data: dict[str, Any] = {
         "frequency": ("vibration", np.abs(value.imag) / (2.0 * np.pi)),
         "undamped_frequency": ("vibration", size / (2.0 * np.pi)),
@@ -92,7 +92,7 @@ def _phase(translation: np.ndarray, rotation: np.ndarray, w: np.ndarray) -> np.n
     for k in range(w.shape[1]):
         shown = translation[k].ravel() if np.abs(translation[k]).max(initial=0.0) > 0.0 else rotation[k].ravel()
         every = shown if np.abs(shown).max(initial=0.0) > 0.0 else w[:, k]
-        largest = every[first_largest(np.abs(every))]
+        largest = every[index_of_largest(np.abs(every))]
         phases.append(np.conj(largest) / abs(largest))
     return np.array(phases, dtype=complex)
 

@@ -15,7 +15,7 @@ from flexclear.dynamics.loads.fields import act, measure, number
 from flexclear.dynamics.loads.row import Row, numbers
 from flexclear.dynamics.vectors import scale
 from flexclear.scene.loads import JointFriction
-from flexclear.system.errors import together
+from flexclear.system.errors import all_or_errors
 
 
 @kernel
@@ -37,7 +37,7 @@ def row(load: JointFriction, path: str, coordinate: Coordinate) -> Row:
     if load.coulomb is not None:
         dimensions = {"static": force, "dynamic": force, "v_static": speed, "v_dynamic": speed}
         given.append(partial(numbers, load.coulomb, f"{path[:-1]}.coulomb]", **dimensions))
-    (viscous,), *dry_friction = together(given)
+    (viscous,), *dry_friction = all_or_errors(given)
     if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
         raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
     dry: tuple[float, ...] = (0.0, 0.0, 1.0, 2.0)

@@ -10,7 +10,7 @@ from flexclear.dynamics.loads import lookup
 from flexclear.scene.formulas import Formula
 from flexclear.scene.laws import Polynomial
 from flexclear.scene.units import quantity_at
-from flexclear.system.errors import together
+from flexclear.system.errors import all_or_errors
 
 #: the time itself, as a law
 TIME = Polynomial(type="polynomial", coefficients=(0.0, 1.0))
@@ -44,7 +44,7 @@ class Row:
 def numbers(load: Any, path: str, **dimensions: str) -> list[float]:
     """Return the numbers of these keys of a load in SI; raise the InputErrors of all that have another dimension."""
     keys = dimensions.items()
-    return together(partial(quantity_at, f"{path[:-1]}.{key}]", getattr(load, key), of) for key, of in keys)
+    return all_or_errors(partial(quantity_at, f"{path[:-1]}.{key}]", getattr(load, key), of) for key, of in keys)
 
 
 def by_formula(formula: Formula, path: str, **acts: Any) -> Row:

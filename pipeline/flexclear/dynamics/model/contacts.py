@@ -23,7 +23,7 @@ from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.numbering import Numbering
 from flexclear.dynamics.model.stops import End, ends_an_angle
 from flexclear.scene.clearance import Clearance
-from flexclear.system.errors import InputError, together
+from flexclear.system.errors import InputError, all_or_errors
 
 if TYPE_CHECKING:
     from flexclear.dynamics.contact.law import Resolved
@@ -37,8 +37,8 @@ SitePairs = Sequence[tuple[int, int]]
 
 def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
     """Return the normal law of each contact with its numbers; raise InputError for a law with impossible values."""
-    together(partial(_check_friction, name, joint.friction) for name, joint in mechanism.scene.joint.items())
-    return tuple(together(partial(resolve_one, mechanism, contact) for contact in mechanism.contacts))
+    all_or_errors(partial(_check_friction, name, joint.friction) for name, joint in mechanism.scene.joint.items())
+    return tuple(all_or_errors(partial(resolve_one, mechanism, contact) for contact in mechanism.contacts))
 
 
 def _check_friction(name: str, friction: Any) -> None:

@@ -12,7 +12,7 @@ from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
-from flexclear.system.errors import InputError, together
+from flexclear.system.errors import InputError, all_or_errors
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,9 @@ def label(joint: str, kind: str, k: int) -> str:
 def prescribed_coordinates(scene: Scene) -> list[Prescribed]:
     """Return all prescribed coordinates, in the order of the scene; raise InputError for those that do not exist."""
     return [
-        one for drive in together(partial(_coordinates_of_drive, scene, name) for name in scene.drive) for one in drive
+        one
+        for drive in all_or_errors(partial(_coordinates_of_drive, scene, name) for name in scene.drive)
+        for one in drive
     ]
 
 

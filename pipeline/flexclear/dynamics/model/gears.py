@@ -13,7 +13,7 @@ from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model.driving import named_coordinate
 from flexclear.dynamics.model.merge import Placement
 from flexclear.scene.units import quantity_at
-from flexclear.system.errors import InputError, together
+from flexclear.system.errors import InputError, all_or_errors
 
 if TYPE_CHECKING:
     from flexclear.dynamics.model.filling import Filling
@@ -77,13 +77,13 @@ class Coupling:
 
 def couplings(mechanism: Mechanism) -> list[Coupling]:
     """Return the couplings of all gears of a scene; raise InputError for impossible ones."""
-    return together(partial(_coupling, mechanism, name) for name in mechanism.scene.gear)
+    return all_or_errors(partial(_coupling, mechanism, name) for name in mechanism.scene.gear)
 
 
 def _coupling(mechanism: Mechanism, name: str) -> Coupling:
     ratio, *named = coordinates_and_ratio(mechanism.scene, name)
     keys = ("first", "second")
-    first, second = together(
+    first, second = all_or_errors(
         partial(_side, mechanism, *n, f"[gear.{name}.{k}]") for k, n in zip(keys, named, strict=True)
     )
     return Coupling(name, ratio, second, first)
@@ -92,7 +92,7 @@ def _coupling(mechanism: Mechanism, name: str) -> Coupling:
 def coordinates_and_ratio(scene: Scene, name: str) -> tuple[float, tuple[str, Coordinate], tuple[str, Coordinate]]:
     """Return a gear's ratio in SI, and joint and coordinate of both its sides; raise InputError for impossible ones."""
     gear = scene.gear[name]
-    first, second = together(
+    first, second = all_or_errors(
         partial(named_coordinate, scene, getattr(gear, side), f"[gear.{name}.{side}]") for side in ("first", "second")
     )
     dimensions = {(True, True): "number", (False, False): "number", (True, False): "length per angle"}

@@ -10,7 +10,7 @@ import numpy as np
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.components import coupled_frames
 from flexclear.dynamics.model.mechanism import Mechanism
-from flexclear.numerics.rotations import first_largest
+from flexclear.numerics.rotations import index_of_largest
 
 if TYPE_CHECKING:
     from flexclear.artifacts.labelled import Labelled
@@ -106,7 +106,7 @@ def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.
     still, moving = rows[rank:].T, rows[:rank].T
     _, axes = np.linalg.eigh(still.T @ (stiffness[:, None] * still))
     shapes = still @ axes
-    shapes *= np.sign(shapes[first_largest(np.abs(shapes), axis=0), np.arange(shapes.shape[1])])
+    shapes *= np.sign(shapes[index_of_largest(np.abs(shapes), axis=0), np.arange(shapes.shape[1])])
     # rotations before displacements: then only the first shapes rotate frames. With a heavy body on a frame, the mass
     # matrix of other moving shapes, scaled to a unit diagonal, is worse conditioned by a factor of 10 to 100
     turns_first, _ = np.linalg.qr((motions[np.any(motions != 0.0, axis=1)] @ moving)[::-1].T)

@@ -51,7 +51,7 @@ def internal_states(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
             yield from turns(int(row["surfaces"]), joint, coordinate)
         elif row["bristle"] >= 0:
             yield ("contact", contact.name), range(int(row["bristle"]), int(row["bristle"]) + 3)
-    joints = list(scene.rubbing())
+    joints = list(scene.joints_with_friction())
     for row in arrays.table(m.NAMED["bearings"]):
         if row["bristle"] >= 0:
             where = (str(int(row[k])) for k in ("kind", "side", "axis"))

@@ -26,7 +26,7 @@ PRESSES = {"along": 1, "about": 1, "one_end": 2, "other_end": 2}
 def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Group]:
     """Return the ledger groups: first the loss of each joint [J], then the bristles [m] of each bearing."""
     losses, bristles = list[Group](), list[Group]()
-    for name, joint in mechanism.scene.rubbing().items():
+    for name, joint in mechanism.scene.joints_with_friction().items():
         part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), bristle(name, joint)
         losses.append((energies[part], 1, part))
         bristles += [] if size is None else [(size, 3, part)] * len(BEARINGS[joint.type])
@@ -36,7 +36,7 @@ def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Grou
 def guards(mechanism: Mechanism) -> Iterator[Guard]:
     """Yield the guards of each bearing: speeds, reversals of sliding for laws with bristles, reversals of loads."""
     bearing = 0
-    for joint in mechanism.scene.rubbing().values():
+    for joint in mechanism.scene.joints_with_friction().values():
         law = friction_law(joint)
         assert joint.friction is not None
         for _ in BEARINGS[joint.type]:
@@ -55,9 +55,9 @@ def fill(filling: Filling) -> dict[str, Any]:
     mechanism, laws = numbering.mechanism, filling.parts.kinds("joint_friction")
     pairs = [(c, part, *both) for c, one in enumerate(closures) for part, both in enumerate(one.ends)]
     ends = [(c, part, numbering.site(a), numbering.site(b)) for c, part, a, b in pairs]
-    slot = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.rubbing())
+    slot = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.joints_with_friction())
     tables: dict[str, list[Any]] = defaultdict(list)
-    for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
+    for number, (name, joint) in enumerate(mechanism.scene.joints_with_friction().items()):
         a, b = (mechanism.site(frame) for frame in joint.between)
         sites = numbering.site(a), numbering.site(b)
         link, reverse = _link(mechanism, name)

@@ -13,7 +13,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
 from flexclear.dynamics.model.driving import Prescribed, prescribed_coordinates
 from flexclear.scene.schema import Scene
-from flexclear.system.errors import InputError, together
+from flexclear.system.errors import InputError, all_or_errors
 
 #: largest angle of a law [rad]; it is resolved to a radian or so
 LARGEST_ANGLE = 1e15
@@ -27,7 +27,7 @@ def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:
     Raises InputError where a value has the wrong dimension, a law does not cover the run, or value or rate jump: no
     finite force could follow.
     """
-    return together(partial(_drive_law, scene, one, given.get(one.name)) for one in prescribed_coordinates(scene))
+    return all_or_errors(partial(_drive_law, scene, one, given.get(one.name)) for one in prescribed_coordinates(scene))
 
 
 def _drive_law(scene: Scene, one: Prescribed, given: Pieces | None) -> Pieces:

@@ -24,7 +24,7 @@ from flexclear.dynamics.model.merge import Placement, find_frame
 from flexclear.dynamics.model.numbering import Numbering
 from flexclear.scene.formulas import formula
 from flexclear.scene.schema import Scene
-from flexclear.system.errors import InputError, together
+from flexclear.system.errors import InputError, all_or_errors
 
 #: stands for the first site of a load on one frame, which acts between the world and that frame
 WORLD = -1
@@ -70,8 +70,8 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
     rows: list[tuple[int, ...]] = []
     bends, looks = list[tuple[float, ...]](), list[int]()
     numbers, laws = list[float](), list[Pieces]()
-    described = together(partial(describe, scene, name, given) for name in names)
-    frames_of = together(
+    described = all_or_errors(partial(describe, scene, name, given) for name in names)
+    frames_of = all_or_errors(
         partial(acting_frames, mechanism, name, one.row) for name, one in zip(names, described, strict=True)
     )
     for name, frames, (row, coordinate, measured, its_laws) in zip(names, frames_of, described, strict=True):
@@ -145,7 +145,7 @@ def describe(scene: Scene, name: str, given: Mapping[str, Pieces] = NO_LAWS) -> 
         raise InputError(path, str(error)) from None
     if f"load.{name}" in given:
         return Description(row, coordinate, measured, [given[f"load.{name}"]])
-    return Description(row, coordinate, measured, together(partial(checked_law, scene, *one) for one in row.laws))
+    return Description(row, coordinate, measured, all_or_errors(partial(checked_law, scene, *one) for one in row.laws))
 
 
 def acting_frames(mechanism: Mechanism, name: str, row: Row) -> tuple[str, ...]:

@@ -155,7 +155,7 @@ def _idle_gravity(mechanism: Mechanism) -> Iterator[tuple[str, str, str]]:
         axes.setdefault(PLANAR.get(getattr(joint, "held", None) or joint.type, ""), []).append(R[:, 2])
     normals, slides = (np.array(axes.get(key, [])).reshape(-1, 3) for key in ("turns", "slides"))
     apart = any(link.branch.edge is None or link.on_path for link in mechanism.links[1:])
-    if not len(normals) or "" in axes or apart or scene.rubbing() or not mechanism.all_rigid:
+    if not len(normals) or "" in axes or apart or scene.joints_with_friction() or not mechanism.all_rigid:
         return
     planar = np.all(abs(normals @ normals[0]) > 1.0 - PARALLEL) and np.all(abs(slides @ normals[0]) < PARALLEL)
     for name, load in scene.load.items():

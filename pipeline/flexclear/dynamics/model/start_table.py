@@ -14,7 +14,7 @@ from flexclear.dynamics.model.driving import coordinate_of
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
 from flexclear.scene.units import quantity_at
-from flexclear.system.errors import InputError, together
+from flexclear.system.errors import InputError, all_or_errors
 
 if TYPE_CHECKING:
     from flexclear.artifacts.labelled import Labelled
@@ -47,7 +47,7 @@ def given_coordinates(scene: Scene) -> list[Given]:
     Raises InputError for unknown joints and coordinates, and for units that do not fit.
     """
     joints = scene.start.joint if scene.start is not None else {}
-    return together(partial(_given_start, scene, joint, name) for joint, named in joints.items() for name in named)
+    return all_or_errors(partial(_given_start, scene, joint, name) for joint, named in joints.items() for name in named)
 
 
 def _given_start(scene: Scene, joint: str, name: str) -> Given:
@@ -56,7 +56,7 @@ def _given_start(scene: Scene, joint: str, name: str) -> Given:
     path = f"[start.joint.{joint}.{name}]" if name else f"[start.joint.{joint}]"
     _, number, coordinate = coordinate_of(scene, joint, name or None, path)
     rate = "angular velocity" if coordinate.turning else "velocity"
-    values = together(
+    values = all_or_errors(
         partial(_value, f"{path[:-1]}.{key}]", getattr(start, key), dimension)
         for key, dimension in (("position", coordinate.dimension), ("near", coordinate.dimension), ("velocity", rate))
     )

@@ -12,7 +12,7 @@ from flexclear.scene.clearance import NormalLaw
 from flexclear.scene.parts import Stop
 from flexclear.scene.schema import Scene
 from flexclear.scene.units import quantity_at
-from flexclear.system.errors import InputError, together
+from flexclear.system.errors import InputError, all_or_errors
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def ends(scene: Scene, lengths: Mapping[str, float]) -> list[tuple[str, End]]:
 
     lengths: size of the mechanism that each stopped joint belongs to [m].
     """
-    pairs = together(partial(_both, scene, name, stop, lengths) for name, stop in scene.stop.items())
+    pairs = all_or_errors(partial(_both, scene, name, stop, lengths) for name, stop in scene.stop.items())
     return [(f"{end.stop}.{side}", end) for pair in pairs for side, end in pair.items()]
 
 
@@ -59,7 +59,7 @@ def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> 
 
     def read(keys: Sequence[str], dimension: str) -> dict[str, float]:
         given = [partial(quantity_at, f"[stop.{name}.{key}]", getattr(stop, key), dimension) for key in keys]
-        return dict(zip(keys, together(given), strict=True))
+        return dict(zip(keys, all_or_errors(given), strict=True))
 
     limits = read(stop.ends, coordinate.dimension)
     if len(limits) == 2 and not limits["lower"] < limits["upper"]:

@@ -12,7 +12,7 @@ from flexclear.dynamics.model.mechanism import Mechanism
 
 def _worn(mechanism: Mechanism) -> list[int]:
     names = [contact.name for contact in mechanism.contacts]
-    return [names.index(name) for name in mechanism.scene.worn()]
+    return [names.index(name) for name in mechanism.scene.wearing_joints()]
 
 
 def fill(filling: Filling) -> dict[str, Any]:

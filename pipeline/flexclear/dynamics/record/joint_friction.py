@@ -32,7 +32,7 @@ def friction_series(model: Model, seen: Observed) -> Series:
         "joint_friction_power": (dims, _summed(joints, -size * bearings["loss"])),
         "joint_friction_force": ((*dims, "axis"), force),
         "joint_friction_moment": ((*dims, "axis"), moment - np.cross(middle, force)),
-    }, {"rubbing": list(model.scene.rubbing())}
+    }, {"rubbing": list(model.scene.joints_with_friction())}
 
 
 def _mine(row: np.ndarray) -> slice:
@@ -46,7 +46,7 @@ def _summed(joints: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def warnings(run: Run) -> list[str]:
     """Return warnings about friction that depends on reactions which rigid bodies leave undetermined."""
-    doubted = [name for name in run.scene.rubbing() if name in run.engine.mobility.redundant_joints]
+    doubted = [name for name in run.scene.joints_with_friction() if name in run.engine.mobility.redundant_joints]
     if not doubted:
         return []
     return [

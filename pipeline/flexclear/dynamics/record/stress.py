@@ -22,7 +22,7 @@ import numpy as np
 from flexclear.dynamics.equations.observation import Series, Variables
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.record.wrenches import FrameWrench, Wrench, joint_wrenches, on_frames, path_wrenches
-from flexclear.numerics.rotations import components, first_largest, matrices, principal, skew, von_mises
+from flexclear.numerics.rotations import components, index_of_largest, matrices, principal, skew, von_mises
 from flexclear.system.errors import InputError
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ def peak_stresses(bundle: Labelled, forces: np.ndarray) -> tuple[np.ndarray, np.
         angle = _bending_angle(forces[:, s]) * is_round[s]
         loads = _forces_in_turned_axes(forces[:, s], angle) if is_round[s] else forces[:, s]
         sigma, tau_y, tau_z = np.moveaxis(np.einsum("fcl,tl->tfc", fibres, loads, optimize=True), -1, 0)
-        axial[:, s] = _pick_by_row(sigma, first_largest(np.abs(sigma), axis=1))
+        axial[:, s] = _pick_by_row(sigma, index_of_largest(np.abs(sigma), axis=1))
         size = np.sqrt(sigma**2 + 3.0 * (tau_y**2 + tau_z**2))
         worst, c, d = np.argmax(size, axis=1), np.cos(angle), np.sin(angle)
         mises[:, s] = _pick_by_row(size, worst)

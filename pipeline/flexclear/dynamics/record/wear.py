@@ -30,4 +30,4 @@ def wear_series(model: Model, seen: Observed) -> Series:
         "wear_load_path": (dims, books["load_path"]),
         "wear_direction_outer": ((*dims, "axis"), outer),
         "wear_direction_inner": ((*dims, "axis"), inner),
-    }, {"worn": list(model.scene.worn())}
+    }, {"worn": list(model.scene.wearing_joints())}

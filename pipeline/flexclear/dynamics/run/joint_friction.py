@@ -19,7 +19,7 @@ OTHERWISE = (m.CAP_REACHED, m.NOT_A_NUMBER, m.STUCK_EVENT, m.STEPPED_OVER)
 
 def losses(model: Model) -> Losses:
     """Return the loss variables of the joints (`run.ledger.Losses`)."""
-    joints = model.scene.rubbing().items()
+    joints = model.scene.joints_with_friction().items()
     sites = [(model.mechanism.site(joint.between[0]), model.mechanism.site(joint.between[1])) for _, joint in joints]
     return "joint_friction_loss", "rubbing", sites, [f"the friction of joint {name}" for name, _ in joints]
 
@@ -28,7 +28,7 @@ def explanation(engine: Engine) -> str | None:
     """Return an explanation when the last evaluation jammed (no loads grow from those without friction), else None."""
     if engine.n[m.EVALUATION] != m.JAMMED or engine.n[m.STATUS] in OTHERWISE:
         return None
-    names, gains = list(engine.model.scene.rubbing()), _gains(engine)
+    names, gains = list(engine.model.scene.joints_with_friction()), _gains(engine)
     worst = int(np.argmax(gains))
     return (
         f"the friction of joint {names[worst]} increases its own normal force (by {gains[worst]:.3g} of "

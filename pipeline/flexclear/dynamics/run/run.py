@@ -33,7 +33,7 @@ from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError, StoppedError, refuse
 from flexclear.system.progress import Progress
 from flexclear.workflow import stopping
-from flexclear.workflow.cores import meanwhile
+from flexclear.workflow.cores import run_in_thread
 
 if TYPE_CHECKING:
     from flexclear.dynamics.run.horizon.horizon import PerturbedRun
@@ -223,7 +223,7 @@ class RunInParts:
         def neighbour(alive: Progress) -> PerturbedRun:
             return pair.perturbed_run(self._start, lambda mine, y, *text: steps(mine, y, alive, *text), alive, begins)
 
-        with meanwhile(neighbour) as perturbed:
+        with run_in_thread(neighbour) as perturbed:
             done = self._observed(*pair.run(lambda *text: self._advanced(np.inf)))
             if done.stopped:
                 return done

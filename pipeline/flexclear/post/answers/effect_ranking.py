@@ -29,9 +29,9 @@ from flexclear.post.answers.effect_sizes import (
     MEANING_NOT_COMPARABLE,
     NOT_COMPARABLE,
     cell,
+    format_difference,
     join_names,
     with_early_changes,
-    written,
 )
 from flexclear.post.overview.curves import format_to_digits, in_unit, size_of
 from flexclear.post.plotting.table import Table
@@ -165,7 +165,7 @@ def in_words(
         means = f"; the runs themselves err by up to {in_unit(change.uncertainty, unit, 2)}"
     part = percent(change.difference or change.uncertainty) if change.difference < LARGE * scale else ""
     up_to = "by up to" if change.difference else "by less than"
-    value = written(change.difference, change.uncertainty if members else 0.0, unit)
+    value = format_difference(change.difference, change.uncertainty if members else 0.0, unit)
     if not change.difference:
         value = in_unit(change.uncertainty, unit, 2)
     amount = f"{up_to} <b class='n'>{value}</b>{part}"

@@ -197,10 +197,10 @@ def cell(dataset: xr.Dataset, name: str, at: tuple[int, ...], unit: str) -> str:
 
 
 def _cell(value: float, uncertainty: float, unit: str) -> str:
-    return "none" if value == uncertainty == 0.0 else written(value, uncertainty, unit)
+    return "none" if value == uncertainty == 0.0 else format_difference(value, uncertainty, unit)
 
 
-def written(value: float, uncertainty: float, unit: str) -> str:
+def format_difference(value: float, uncertainty: float, unit: str) -> str:
     """Format a difference with its uncertainty by chance, in a fitting unit; one that is all chance as a limit."""
     if np.isnan(value):
         return "–"
@@ -216,7 +216,7 @@ def join_names(names: Sequence[str]) -> str:
     return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
 
-def stay(names: Sequence[str]) -> str:
+def staying_contacts_sentence(names: Sequence[str]) -> str:
     """Return a sentence on the contacts that an ideal mechanism keeps, with these names; empty without any."""
     if not names:
         return ""

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.artifacts.effect_size import Agreement
-from flexclear.post.answers.effect_sizes import join_names, written
+from flexclear.post.answers.effect_sizes import format_difference, join_names
 from flexclear.post.plotting.table import Table
 from flexclear.scene.output import Schema
 from flexclear.scene.output import table as described
@@ -42,7 +42,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     names, decisions, meshes = list(plan.requested), plan.decisions, list(plan.meshes.values())
     uncertainties = [[d.uncertainty.get(n, 0.0 if n in d.estimate else np.nan) for n in names] for d in decisions]
     planned = {
-        "gone": [effect.name for effect in plan.gone],
+        "gone": [effect.name for effect in plan.removed_effects],
         "modes": dict(plan.modes),
         **({"integrator": plan.integrator, "rtol": plan.rtol} if plan.integrator else {}),
         **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
@@ -86,7 +86,7 @@ def _texts(words: Iterable[str]) -> np.ndarray:
     return np.array(list(words), dtype=object)
 
 
-def drawn(planned: xr.Dataset) -> xr.Dataset:
+def upper_bounds(planned: xr.Dataset) -> xr.Dataset:
     """Return the upper bounds of a plan's effect sizes, as the chart takes them."""
     return xr.Dataset(
         {"dropped": planned["influence"] + planned["uncertainty"].fillna(0.0)},
@@ -102,13 +102,14 @@ def table(planned: xr.Dataset) -> Table:
     for i, effect in enumerate(planned["words"].values):
         part = planned.isel(effect=i)
         cells = [
-            written(float(part["influence"][k]), float(np.nan_to_num(part["uncertainty"][k])), unit)
+            format_difference(float(part["influence"][k]), float(np.nan_to_num(part["uncertainty"][k])), unit)
             for k, unit in enumerate(units)
         ]
         decision = "keep" if int(part["kept"]) else "drop"
         rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
     requested = [
-        written(float(value), 0.0, unit) for value, unit in zip(planned["requested"].values, units, strict=True)
+        format_difference(float(value), 0.0, unit)
+        for value, unit in zip(planned["requested"].values, units, strict=True)
     ]
     rows.append(("requested", "", *requested, "", ""))
     decided = json.loads(planned.attrs["planned"])
@@ -154,7 +155,7 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
     """Return one or two sentences on whether a body has enough finite elements."""
     given, called = int(part["elements"]), int(part["elements_called_for"])
     errors = [
-        f"{name} by at most {written(float(value), 0.0, unit)}"
+        f"{name} by at most {format_difference(float(value), 0.0, unit)}"
         for name, value, unit in zip(part["quantity"].values, part["mesh_error"].values, units, strict=True)
         if np.isfinite(value)
     ]
@@ -190,7 +191,7 @@ MET, MET_TO_HORIZON, MISSED, UNDECIDED = "met", "met to the horizon", "missed", 
 
 def verdict(one: Agreement) -> str:
     """Return met where error plus chance is below the allowed error, missed where certainly above, else not decided."""
-    if one.met:
+    if one.is_met:
         return MET if one.horizon == 1.0 else MET_TO_HORIZON
     return MISSED if one.is_missed else UNDECIDED
 
@@ -200,8 +201,8 @@ def verification_table(planned: xr.Dataset) -> Table:
     rows = []
     for k, name in enumerate(planned["quantity"].values):
         unit, one = str(planned["unit"].values[k]), agreement_of(planned, k)
-        requested = written(float(planned["requested"][k]), 0.0, unit)
-        rows.append((str(name), requested, written(one.error, one.chance, unit), _verdict(planned, k)))
+        requested = format_difference(float(planned["requested"][k]), 0.0, unit)
+        rows.append((str(name), requested, format_difference(one.error, one.chance, unit), _verdict(planned, k)))
     notes = [
         f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
         f"{int(planned.attrs['planned_evaluations']):,} as planned"
@@ -227,7 +228,7 @@ def _verdict(planned: xr.Dataset, k: int) -> str:
     if one.horizon < 1.0:
         reasons.append(
             f"after {one.horizon:.0%} of the time runs of the full scene from slightly different starts differ by "
-            f"{written(float(planned['scatter'][k]), 0.0, unit)}"
+            f"{format_difference(float(planned['scatter'][k]), 0.0, unit)}"
             + (", and the means differ by less" if result == MET_TO_HORIZON else "")
         )
     enough = one.enough(planned.attrs["members"])

@@ -12,7 +12,7 @@ from flexclear.artifacts.quantities import SEPARATED
 from flexclear.post.cost.study import methods
 from flexclear.post.overview.curves import size_of
 from flexclear.post.plotting import style
-from flexclear.post.single_run.series import sentence
+from flexclear.post.single_run.series import horizon_sentence
 from flexclear.scene import integrators
 
 #: largest error of the energy balance, as a fraction of the largest change of any energy
@@ -58,8 +58,8 @@ def checks(
     members: horizon of the scene's ensemble [s], or None.  by_need: True when the program chose the integrator.
     """
     agreement = [] if study is None else _agreement(study, _finer(run))
-    result = [_energy(run), *_loops(run), *agreement, _rejected_steps(run), _stiff(run, by_need)]
-    return [*result, *_condition(run), *_predictable(run, members)]
+    result = [_energy_check(run), *_loops(run), *agreement, _rejected_steps(run), _stiffness_check(run, by_need)]
+    return [*result, *_condition_checks(run), *_predictability_checks(run, members)]
 
 
 def lost_energy(run: xr.Dataset) -> np.ndarray:
@@ -76,7 +76,7 @@ def _drift(run: xr.Dataset) -> np.ndarray | None:
     return np.asarray(np.abs(run["constraint_error"].values) / extent)
 
 
-def _energy(run: xr.Dataset) -> Check:
+def _energy_check(run: xr.Dataset) -> Check:
     fraction = float(lost_energy(run).max())
     value = f"{fraction:.1e} of the largest energy"
     return Check("energy balance", value, f"{ENERGY:g}", fraction < ENERGY, _finer(run))
@@ -125,7 +125,7 @@ def _rejected_steps(run: xr.Dataset) -> Check:
     return Check("rejected steps", f"{100.0 * fraction:.2g} %", f"{100.0 * REJECTED:g} %", fraction < REJECTED, remedy)
 
 
-def _stiff(run: xr.Dataset, by_need: bool) -> Check:
+def _stiffness_check(run: xr.Dataset, by_need: bool) -> Check:
     fraction, chosen = float(run.attrs.get("stiff_share", 0.0)), by_need or "method_reason" in run.attrs
     limit = "none: the integrator was chosen by its cost" if chosen else f"{100.0 * STIFF:g} %"
     remedy = f'an implicit integrator: [solver] integrator = "{integrators.STIFF}"'
@@ -133,7 +133,7 @@ def _stiff(run: xr.Dataset, by_need: bool) -> Check:
     return Check(name, f"{100.0 * fraction:.2g} %", limit, chosen or fraction < STIFF, remedy)
 
 
-def _condition(run: xr.Dataset) -> list[Check]:
+def _condition_checks(run: xr.Dataset) -> list[Check]:
     if "condition" not in run:
         return []
     worst = int(np.argmax(run["condition"].values))
@@ -144,7 +144,7 @@ def _condition(run: xr.Dataset) -> list[Check]:
     ]
 
 
-def _predictable(run: xr.Dataset, members: float | None) -> list[Check]:
+def _predictability_checks(run: xr.Dataset, members: float | None) -> list[Check]:
     if "horizon" not in run:
         return []
     end = float(run["time"][-1])
@@ -173,7 +173,7 @@ def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -
         else "Not in all checks: " + "; ".join(f"{c.name} ({c.value}, limit {c.limit}): {c.remedy}" for c in bad) + "."
     )
     if "horizon" in run:
-        text += " " + sentence(float(run["horizon"]), float(run["time"][-1]), members)
+        text += " " + horizon_sentence(float(run["horizon"]), float(run["time"][-1]), members)
     return text
 
 

@@ -12,10 +12,10 @@ import xarray as xr
 from flexclear.artifacts import quantities
 from flexclear.artifacts.effect_size import Influence
 from flexclear.post.answers.effect_ranking import in_words
-from flexclear.post.answers.effect_sizes import stay
+from flexclear.post.answers.effect_sizes import staying_contacts_sentence
 from flexclear.post.answers.stability import ENERGY, lost_energy
 from flexclear.post.overview.curves import impacts, in_unit
-from flexclear.post.single_run.series import parameters, sentence
+from flexclear.post.single_run.series import horizon_sentence, parameters
 from flexclear.scene.clearance import SURFACES
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import contacts_that_stay
@@ -41,7 +41,7 @@ def answer(
         lacks = "Balls on planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
         sentences.append(f"{lacks}, so there is no idealised run to compare it with.")
     if run is not None:
-        sentences += [*_impacts(run), *_horizon(run, members), *_trust(run)]
+        sentences += [*_impacts(run), *_horizon_lines(run, members), *_trust_lines(run)]
     if warnings:
         many = "one warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
         sentences.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
@@ -50,7 +50,7 @@ def answer(
         [] if run is None else contacts_that_stay({n: j["type"] for n, j in parameters(run).get("joint", {}).items()})
     )
     head += "; after ±, what may be due to chance" if any("±" in text for text in changes) else ""
-    head += f" ({html.escape(stay(keeps)).rstrip('.')}):" if keeps else ":"
+    head += f" ({html.escape(staying_contacts_sentence(keeps)).rstrip('.')}):" if keeps else ":"
     return f"{'' if compared is None else f'<p>{head}</p>'}<ul>{''.join(f'<li>{text}</li>' for text in sentences)}</ul>"
 
 
@@ -83,7 +83,7 @@ def _impacts(run: xr.Dataset) -> list[str]:
     return sentences
 
 
-def _horizon(run: xr.Dataset, members: float | None) -> list[str]:
+def _horizon_lines(run: xr.Dataset, members: float | None) -> list[str]:
     if "horizon" not in run:
         return []
     end, horizon = float(run["time"].values[-1]), float(run["horizon"])
@@ -92,10 +92,10 @@ def _horizon(run: xr.Dataset, members: float | None) -> list[str]:
         if min(horizon, end if members is None else members) < end
         else ""
     )
-    return [html.escape(sentence(horizon, end, members)) + later]
+    return [html.escape(horizon_sentence(horizon, end, members)) + later]
 
 
-def _trust(run: xr.Dataset) -> list[str]:
+def _trust_lines(run: xr.Dataset) -> list[str]:
     fraction = float(lost_energy(run).max())
     word = "<span class='good'>closes</span>" if fraction < ENERGY else "<span class='bad'>does not close</span>"
     return [

@@ -15,7 +15,7 @@ from flexclear.post.plotting.table import Table
 
 def sentences(study: xr.Dataset) -> str:
     """Return the answer in words; study: of `stages.cost_study`."""
-    return " ".join(filter(None, (_own(study), _digit(study), *undone(study))))
+    return " ".join(filter(None, (_own_method_sentence(study), _digit(study), *skipped_sentence(study))))
 
 
 def _worst(study: xr.Dataset) -> tuple[str, float]:
@@ -25,7 +25,7 @@ def _worst(study: xr.Dataset) -> tuple[str, float]:
     return f"{size_of(str(study['unit'].values[k]))} of {study['quantity'].values[k]}", float(errors[k])
 
 
-def _own(study: xr.Dataset) -> str:
+def _own_method_sentence(study: xr.Dataset) -> str:
     of, error = _worst(study)
     setting = (
         f"rtol {study.attrs['own_rtol']:g}" if "own_rtol" in study.attrs else f"steps of {study.attrs['own_step']:g} s"
@@ -51,7 +51,7 @@ def _digit(study: xr.Dataset) -> str:
     return f"One more digit costs {better.seconds / study.attrs['own_seconds']:.2g} times as much ({better.name})."
 
 
-def undone(study: xr.Dataset) -> list[str]:
+def skipped_sentence(study: xr.Dataset) -> list[str]:
     """Return a sentence on runs that were skipped, if any."""
     return [f"Not run within the budget: {study.attrs['undone']}."] if study.attrs.get("undone") else []
 
@@ -84,10 +84,10 @@ class Studied:
 def markdown(scenes: tuple[Studied, ...], page: str) -> str:
     """Return the whole page."""
     names = " ".join(s.scene for s in scenes)
-    return "\n".join([INTRODUCTION.format(scenes=names, page=page), sections(scenes)])
+    return "\n".join([INTRODUCTION.format(scenes=names, page=page), advice_sections(scenes)])
 
 
-def sections(scenes: tuple[Studied, ...]) -> str:
+def advice_sections(scenes: tuple[Studied, ...]) -> str:
     """Return the advice on each scene, and then each scene's pictures and tables."""
     parts = ["## What to choose\n", *(f"- **{s.scene}**: {s.advice}\n" for s in scenes)]
     for s in scenes:

@@ -94,7 +94,7 @@ def causes_of(
         "time integration": between(asis, reference),
         "event location": _location(quantity, reference, located, size, growth),
         "sampling of the output": _sampling(quantity, asis, accepted, runs, size),
-        "ensemble spread": _spread(quantity, ensemble, size),
+        "ensemble spread": _half_interval(quantity, ensemble, size),
     }
 
 
@@ -143,7 +143,7 @@ def _sampling(
     return relative(abs(quantities.scale(denser, quantity) - quantities.scale(asis, quantity)), size)
 
 
-def _spread(quantity: Quantity, ensemble: xr.Dataset | None, size: float) -> float:
+def _half_interval(quantity: Quantity, ensemble: xr.Dataset | None, size: float) -> float:
     """Return half the 95 % interval of the members' mean: by bootstrap of peaks, 1.96 standard errors of series."""
     if ensemble is None:
         return np.nan

@@ -107,7 +107,7 @@ def _panel(
     """Draw one quantity. curves_of: ours, and others'. bound: error below which the reference cannot measure."""
     own, others = curves_of
     for curve in (*own, *others):
-        color, mark = look(curve, others)
+        color, mark = curve_look(curve, others)
         pick = np.isfinite(curve.error[:, k]) & curve.resolved[:, k]
         ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, linewidth=1.0, markersize=4.5, ls="-")
     seconds = np.concatenate([c.seconds for c in own])
@@ -134,7 +134,7 @@ def _panel(
     ax.set(xlabel="CPU time of the integration (s)", ylabel="relative error")
 
 
-def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
+def curve_look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
     """Return colour and mark of a curve; grey ones for other programs."""
     if curve.name in LOOKS:
         return LOOKS[curve.name]
@@ -144,7 +144,7 @@ def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
 def _legend(figure: Figure, own: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
     handles: list[Artist] = []
     for curve in (*own, *others):
-        color, mark = look(curve, others)
+        color, mark = curve_look(curve, others)
         handles.append(Line2D([], [], color=color, marker=mark, label=curve.name))
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
     handles.append(Patch(color=GRID, label="cannot be determined"))

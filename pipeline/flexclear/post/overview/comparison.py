@@ -20,7 +20,7 @@ from flexclear.post.overview.curves import NOISE, Curve, curves, in_unit, readab
 from flexclear.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.post.plotting import style
 from flexclear.post.plotting.table import Table
-from flexclear.post.single_run.series import derive, parameters, sentence
+from flexclear.post.single_run.series import derive, horizon_sentence, parameters
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import InputError
 
@@ -53,12 +53,12 @@ def assemble(
             curve = drawn[i]
             if curve is not None:
                 series["value"][i, j] = curve.values[_indices_at(curve.time, time)]
-            if not quantities.has(run, quantity):
+            if not quantities.has_quantity(run, quantity):
                 continue
             numbers["largest"][i, j] = quantities.scale(run, quantity)
             if label in tighter:
                 numbers["error"][i, j] = quantities.error(run, tighter[label], quantity)
-            if quantities.has(reference, quantity):
+            if quantities.has_quantity(reference, quantity):
                 numbers["difference"][i, j] = _difference_of(run, reference, quantity)
                 if quantity.over_time:
                     when, distance = quantities.deviation(run, reference, quantity)
@@ -126,11 +126,11 @@ def _impacts(runs: Mapping[str, xr.Dataset]) -> dict[str, tuple[tuple[str, ...],
     count, peak = (np.full((len(runs), len(names)), np.nan) for _ in range(2))
     for i, run in enumerate(runs.values()):
         for k, name in enumerate(names):
-            if _has(run, name):
+            if _has_contact(run, name):
                 count[i, k] = len(quantities.events(run, Quantity(name, "impact_times")))
                 peak[i, k] = quantities.events(run, Quantity(name, "peak_force"))[0]
     last = list(runs.values())[-1]
-    units = [quantities.unit(last, Quantity(name, "peak_force")) if _has(last, name) else "N" for name in names]
+    units = [quantities.unit(last, Quantity(name, "peak_force")) if _has_contact(last, name) else "N" for name in names]
     return {
         "impact_count": (("run", "contact"), count),
         "peak_force": (("run", "contact"), peak),
@@ -138,7 +138,7 @@ def _impacts(runs: Mapping[str, xr.Dataset]) -> dict[str, tuple[tuple[str, ...],
     }
 
 
-def _has(run: xr.Dataset, contact: str) -> bool:
+def _has_contact(run: xr.Dataset, contact: str) -> bool:
     return "contact" in run.coords and contact in run["contact"].values
 
 
@@ -164,7 +164,7 @@ def table(compared: xr.Dataset) -> Table:
     ]
     end = float(compared["time"].values[-1])
     notes += [
-        f"{label}: {sentence(float(horizon), end)} Later values hold for this run only."
+        f"{label}: {horizon_sentence(float(horizon), end)} Later values hold for this run only."
         for label, horizon in zip(labels, compared["horizon"].values, strict=True)
         if horizon < end
     ]
@@ -287,7 +287,11 @@ def _distance(
     (_, reference), *others = runs.items()
     lines: list[tuple[int, np.ndarray, np.ndarray]] = []
     for k, (_, run) in enumerate(others, start=1):
-        if quantity.over_time and quantities.has(run, quantity) and quantities.has(reference, quantity):
+        if (
+            quantity.over_time
+            and quantities.has_quantity(run, quantity)
+            and quantities.has_quantity(reference, quantity)
+        ):
             lines.append((k, *quantities.deviation(run, reference, quantity)))
         elif (mine := curves_drawn[k]) is not None and (theirs := curves_drawn[0]) is not None:
             i, j = quantities.common_times(mine.time, theirs.time)

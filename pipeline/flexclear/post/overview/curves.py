@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.artifacts import quantities
-from flexclear.numerics.rotations import Turning, first_largest, rotation_since_start
+from flexclear.numerics.rotations import Turning, index_of_largest, rotation_since_start
 from flexclear.scene.quantity import KINDS, Quantity
 
 #: factors and units for smaller and larger values, largest first
@@ -43,12 +43,12 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
     if not quantity.over_time:
         return [_force(run, quantity.owner) for run in runs]
     if quantity.kind == "orientation":
-        return [_rotation_curve(run, quantity) if quantities.has(run, quantity) else None for run in runs]
-    lines = [quantities.series(run, quantity) if quantities.has(run, quantity) else None for run in runs]
+        return [_rotation_curve(run, quantity) if quantities.has_quantity(run, quantity) else None for run in runs]
+    lines = [quantities.series(run, quantity) if quantities.has_quantity(run, quantity) else None for run in runs]
     present = [values for values in lines if values is not None]
     k, title = 0, _title(runs, quantity)
     if _by_component(quantity) and present:
-        k = int(first_largest(np.max([np.ptp(values, axis=0) for values in present], axis=0)))
+        k = int(index_of_largest(np.max([np.ptp(values, axis=0) for values in present], axis=0)))
         title += f" {'about' if quantity.kind.startswith('angular') else 'along'} {'xyz'[k]}"
     return [
         None
@@ -57,7 +57,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
             title,
             quantities.unit(run, quantity),
             run["time"].values,
-            without_noise(_component_values(values, quantity, k), _noise(run, quantity)),
+            without_noise(_component_values(values, quantity, k), _rounding_range(run, quantity)),
             NONE,
         )
         for run, values in zip(runs, lines, strict=True)
@@ -89,7 +89,7 @@ def _title(runs: Sequence[xr.Dataset], quantity: Quantity) -> str:
     """Return the title of a quantity; the force of a drive about an axis is called torque."""
     if quantity.steps or not quantity.owner:
         return quantity.name.replace("_", " ") if not quantity.steps else quantity.name
-    turns = any(quantities.has(run, quantity) and quantities.unit(run, quantity) == "N m" for run in runs)
+    turns = any(quantities.has_quantity(run, quantity) and quantities.unit(run, quantity) == "N m" for run in runs)
     kind = quantity.kind.replace("force", "torque") if turns else quantity.kind
     words = kind.replace("_", " ").replace("von mises", "von Mises")
     return f"{quantity.owner}: {words}{f' along {c}' if (c := quantity.component) else ''}"
@@ -101,7 +101,7 @@ def _component_values(values: np.ndarray, quantity: Quantity, component: int) ->
     return values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
 
 
-def _noise(run: xr.Dataset, quantity: Quantity) -> float:
+def _rounding_range(run: xr.Dataset, quantity: Quantity) -> float:
     """Return the range that rounding causes in a quantity, by the ranges of all bodies and axes; 0 for other kinds."""
     kind = KINDS[quantity.kind]
     return noise(run, run[kind.variable].values, quantity.unit) if kind.owner in ("body", "frame") else 0.0

@@ -100,7 +100,7 @@ def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
 
 def _drawing_function(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
     if parameters == ["point"]:
-        names = _coordinates(sweep)
+        names = _numeric_parameters(sweep)
         if not names:
             return None
         ordered = len(names) > 1 and _walks(sweep, names)
@@ -111,7 +111,7 @@ def _drawing_function(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
     return {1: _curve, 2: _map}.get(len(parameters))
 
 
-def _coordinates(sweep: xr.Dataset) -> list[str]:
+def _numeric_parameters(sweep: xr.Dataset) -> list[str]:
     """Return the numeric parameters of points, in the order of the sweep."""
     own = [str(name) for name in sweep.coords if sweep[name].dims == ("point",)]
     return [name for name in own if sweep[name].dtype.kind in "fiu"]
@@ -155,7 +155,7 @@ def _family(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 
 def _parameter(sweep: xr.Dataset) -> str:
     dims = [str(dim) for dim in sweep["status"].dims]
-    return _coordinates(sweep)[0] if dims == ["point"] else dims[0]
+    return _numeric_parameters(sweep)[0] if dims == ["point"] else dims[0]
 
 
 def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
@@ -193,7 +193,7 @@ def _edges(values: np.ndarray) -> np.ndarray:
 
 def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     """Draw values by the first parameter, coloured by the second; mean and 5 % and 95 % quantiles as lines."""
-    first, second = _coordinates(sweep)[:2]
+    first, second = _numeric_parameters(sweep)[:2]
     y, scale = sweep[name].values, _scale(sweep, second)[0]
     points = ax.scatter(
         sweep[first].values * _scale(sweep, first)[0], y, c=sweep[second].values * scale, s=11.0, cmap="viridis"

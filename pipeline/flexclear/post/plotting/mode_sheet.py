@@ -31,7 +31,7 @@ def files(name: str, body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.
         return style.files(name, _sheet(body, bundle, view(towards, up), 1.0))
 
 
-def frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> Iterator[np.ndarray]:
+def film_frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> Iterator[np.ndarray]:
     """Yield pictures of one vibration of all modes, shape (height, width, 3)."""
     with style.style():
         camera = view(towards, up)

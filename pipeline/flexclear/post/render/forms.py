@@ -84,29 +84,29 @@ class Solid:
     round: bool
 
 
-def equivalent(mass: float, inertia: np.ndarray) -> Solid:
+def equivalent_solid(mass: float, inertia: np.ndarray) -> Solid:
     """Return the uniform cylinder or box of this mass [kg] and inertia about its centre of mass [kg m^2]."""
     moments, axes = np.linalg.eigh(inertia)
     low, middle, high = moments / mass
     if high - low <= ROUND * high:  # equal moments: a cube shows rotations
-        return Solid(_right(axes), _visible(np.full(3, np.sqrt(1.5 * low))), round=False)
+        return Solid(_right_handed(axes), _not_too_thin(np.full(3, np.sqrt(1.5 * low))), round=False)
     if middle - low <= ROUND * high:
         across, along = 0.5 * (low + middle), high
     elif high - middle <= ROUND * high:
         across, along, axes = 0.5 * (middle + high), low, axes[:, [1, 2, 0]]
     else:
         squares = 1.5 * np.array([middle + high - low, low + high - middle, low + middle - high])
-        return Solid(_right(axes), _visible(np.sqrt(np.clip(squares, 0.0, None))), round=False)
+        return Solid(_right_handed(axes), _not_too_thin(np.sqrt(np.clip(squares, 0.0, None))), round=False)
     radius = np.sqrt(2.0 * along)
     half_length = np.sqrt(3.0 * max(across - 0.25 * radius**2, 0.0))
-    return Solid(_right(axes), _visible(np.array([radius, radius, half_length])), round=True)
+    return Solid(_right_handed(axes), _not_too_thin(np.array([radius, radius, half_length])), round=True)
 
 
-def _visible(half: np.ndarray) -> np.ndarray:
+def _not_too_thin(half: np.ndarray) -> np.ndarray:
     return np.maximum(half, THINNEST * half.max())
 
 
-def _right(axes: np.ndarray) -> np.ndarray:
+def _right_handed(axes: np.ndarray) -> np.ndarray:
     return axes if np.linalg.det(axes) > 0 else axes * np.array([-1.0, 1.0, 1.0])
 
 
@@ -123,7 +123,7 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     if len(points) < 2:
         far = _beyond(points, seats, joined, com, solid, size)
         if len(far) < 2:
-            return _lone(joined, points, com, solid, size)
+            return _surface_without_joints(joined, points, com, solid, size)
         points = far
     spans = np.linalg.norm(points[:, None] - points[None], axis=-1)
     width = min(WIDTH * size, WIDEST * float(spans.max()))
@@ -133,7 +133,7 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     axis = _line(points, width)
     if axis is not None:
         low, high = points[np.argmin(points @ axis)], points[np.argmax(points @ axis)]
-        return surfaces.bar(low, high, _thickness(solid, axis, width))
+        return surfaces.bar(low, high, _bar_radius(solid, axis, width))
     flat = _plane(points, width)
     if flat is not None:
         return _plate(points, flat, 1.3 * width, layer)
@@ -176,7 +176,9 @@ def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
     return surfaces.join(drawn)
 
 
-def _lone(seats: Sequence[Seat], points: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
+def _surface_without_joints(
+    seats: Sequence[Seat], points: np.ndarray, com: np.ndarray, solid: Solid | None, size: float
+) -> Surface:
     """Return the surface of a body without joints, or with all joints at one point."""
     width = WIDTH * size
     point = points[0] if len(points) else com
@@ -207,9 +209,9 @@ def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) 
     """Return a body that hangs on one joint: a bar where its inertia is that of one, else a bob on an arm."""
     axis = (com - point) / np.linalg.norm(com - point)
     half = 0.0 if solid is None else float(solid.half.max())
-    if solid is not None and _slender(solid, axis) and half < 1.5 * np.linalg.norm(com - point):
+    if solid is not None and _is_slender(solid, axis) and half < 1.5 * np.linalg.norm(com - point):
         far = com + half * axis
-        return surfaces.bar(point, far, _thickness(solid, axis, width))
+        return surfaces.bar(point, far, _bar_radius(solid, axis, width))
     radius = 2.4 * width if solid is None else float(np.clip(0.8 * half, 1.8 * width, 4.0 * width))
     return surfaces.join([surfaces.bar(point, com, 0.7 * width), surfaces.place(surfaces.sphere(radius), com)])
 
@@ -255,14 +257,14 @@ def _disc(radius: float, width: float) -> Surface:
     return surfaces.join([surfaces.cylinder(radius, width), mark])
 
 
-def _thickness(solid: Solid | None, axis: np.ndarray, width: float) -> float:
+def _bar_radius(solid: Solid | None, axis: np.ndarray, width: float) -> float:
     """Return the radius of a bar along an axis: that of the slender solid with its inertia, within visible limits."""
-    if solid is None or not _slender(solid, axis):
+    if solid is None or not _is_slender(solid, axis):
         return 0.8 * width
     return float(np.clip(np.sort(solid.half)[1], 0.4 * width, 1.7 * width))
 
 
-def _slender(solid: Solid, axis: np.ndarray) -> bool:
+def _is_slender(solid: Solid, axis: np.ndarray) -> bool:
     longest = solid.axes[:, int(solid.half.argmax())]
     return float(solid.half.max()) > SLENDER * float(np.sort(solid.half)[1]) and abs(float(longest @ axis)) > 0.95
 

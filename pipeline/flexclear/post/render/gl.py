@@ -27,7 +27,7 @@ def state() -> str:
         return f"without {' and '.join(missing_libraries())}: none"
     if not sys.platform.startswith("linux"):
         return f"GL of {sys.platform}"
-    libraries = [name for name in ("libGL.so.1", "libEGL.so.1", "libOSMesa.so.8") if _loads(name)]
+    libraries = [name for name in ("libGL.so.1", "libEGL.so.1", "libOSMesa.so.8") if _is_loadable(name)]
     return "GL: " + (", ".join(libraries) or "none")
 
 
@@ -53,7 +53,7 @@ def works() -> bool:
     return done.returncode == 0
 
 
-def _loads(name: str) -> bool:
+def _is_loadable(name: str) -> bool:
     try:
         ctypes.CDLL(name)
     except OSError:

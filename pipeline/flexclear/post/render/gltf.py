@@ -134,13 +134,15 @@ def motion(drawn: Mechanism, steps: np.ndarray, slower: float) -> bytes:
         if part.owner is not None:
             _follow(file, node, times, np.array([part_pose(run, part, int(step)) for step in steps]))
     for body in drawn.flexible:
-        node, weights = _bent(file, body, bodies[body.index], run["modal_coordinate"].values[steps][:, body.columns])
+        node, weights = _add_flexible_body(
+            file, body, bodies[body.index], run["modal_coordinate"].values[steps][:, body.columns]
+        )
         _follow(file, node, times, np.array([pose(run, body.index, int(step)) for step in steps]))
         file.move(node, "weights", times, weights.ravel())
     return file.bytes(str(run.attrs.get("title", run.attrs.get("scene", "flexclear"))))
 
 
-def _bent(file: _File, body: Flexible, name: str, q: np.ndarray) -> tuple[int, np.ndarray]:
+def _add_flexible_body(file: _File, body: Flexible, name: str, q: np.ndarray) -> tuple[int, np.ndarray]:
     # targets as large as the run's displacements, weights within one: viewers expect that
     largest = np.maximum(np.abs(q).max(axis=0), 1e-30)
     fields = body.scale * largest[:, None, None] * linear_fields(body.bundle)

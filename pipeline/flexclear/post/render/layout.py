@@ -80,7 +80,7 @@ class Layout:
         body = frame.partition(".")[0]
         return self.bodies.index(body) if body in self.bodies else None
 
-    def local(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+    def frame_in_body(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Return origin [m] and axes (columns) of a frame in those of its body."""
         body, _, name = frame.partition(".")
         if body in self.bundles:
@@ -91,7 +91,7 @@ class Layout:
 
     def at_start(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Return origin [m] and axes of a frame, in the world, at the first output."""
-        (origin, axes), owner = self.local(frame), self.owner(frame)
+        (origin, axes), owner = self.frame_in_body(frame), self.owner(frame)
         if owner is None:
             return origin, axes
         matrix = pose(self.run, owner, 0)
@@ -107,7 +107,7 @@ class Layout:
 
     def site(self, frame: str, offset: float = 0.0) -> Site:
         """Return the origin of a frame, or a point so far along its z axis [m]."""
-        (origin, axes), owner = self.local(frame), self.owner(frame)
+        (origin, axes), owner = self.frame_in_body(frame), self.owner(frame)
         if owner is None:
             return Site(None, origin + offset * axes[:, 2])
         if frame in self.frames:
@@ -118,7 +118,7 @@ class Layout:
         self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0
     ) -> Part:
         """Return a part at a frame, given in the frame's axes."""
-        site, axes = self.site(frame), self.local(frame)[1]
+        site, axes = self.site(frame), self.frame_in_body(frame)[1]
         return Part(site.owner, surfaces.place(part, site.origin, axes), color, opacity, site.frame, contact)
 
 
@@ -156,7 +156,7 @@ def _carrier(run: xr.Dataset, owner: int | None, frame: int | None, step: int) -
     return matrix
 
 
-def travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
+def travel_range(run: xr.Dataset, joint: str) -> tuple[float, float]:
     """Return least and largest displacement along a joint's axis [m], that of the assembled start included."""
     for name in (joint, f"{joint}.translation"):
         if "coordinate" in run.coords and name in run.coordinate.values:

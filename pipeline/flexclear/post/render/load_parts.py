@@ -18,7 +18,7 @@ from flexclear.post.render.layout import (
     Part,
     Site,
     samples,
-    travel,
+    travel_range,
 )
 from flexclear.post.render.surfaces import Surface
 from flexclear.scene.units import quantity
@@ -57,10 +57,10 @@ def _spring_on_joint(at: Layout, load: Mapping[str, Any], size: float, bodies: S
     name, joint = load["joint"], at.given["joint"][load["joint"]]
     first, second = joint["between"]
     if joint["type"] in forms.SLIDING and load.get("coordinate") != "rotation":
-        low, high = travel(at.run, name)
+        low, high = travel_range(at.run, name)
         side = 1.0 if 0.5 * (low + high) >= quantity(load.get("rest", 0.0), "length") else -1.0
         (origin, axes), centre = (
-            at.local(second),
+            at.frame_in_body(second),
             at.centre(second.partition(".")[0]) if at.owner(second) is not None else 0.0,
         )
         around = [

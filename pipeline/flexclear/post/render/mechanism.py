@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.post.render import forms, surfaces
-from flexclear.post.render.forms import Seat, Solid, Wheel, equivalent, wheels
+from flexclear.post.render.forms import Seat, Solid, Wheel, equivalent_solid, wheels
 from flexclear.post.render.layout import (
     CLEARANCE_COLOR,
     GROUND_COLOR,
@@ -25,7 +25,7 @@ from flexclear.post.render.layout import (
     part_pose,
     pose,
     samples,
-    travel,
+    travel_range,
 )
 from flexclear.post.render.load_parts import loads
 from flexclear.post.render.surfaces import Surface
@@ -191,7 +191,7 @@ def _seats(at: Layout) -> dict[str, list[Seat]]:
     by_body: dict[str, list[Seat]] = {}
     for kind, frames in sites:
         for k, frame in enumerate(filter(None, frames)):
-            seat = Seat(frame, *at.local(frame), kind, k == 0)
+            seat = Seat(frame, *at.frame_in_body(frame), kind, k == 0)
             by_body.setdefault(frame.partition(".")[0], []).append(seat)
     return by_body
 
@@ -215,7 +215,7 @@ def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
             key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
             key = (rod_of(name, body),) if "segment" in body else key
             color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
-            solid = equivalent(body["mass"], inertia) if np.any(inertia) and body["mass"] else None
+            solid = equivalent_solid(body["mass"], inertia) if np.any(inertia) and body["mass"] else None
             drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
             if len(drawn.points):
                 yield Part(owner, surfaces.place(drawn, -com), color)
@@ -263,7 +263,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
             yield at.part_at_frame(second, surfaces.cylinder(radius, long), color, contact)
             if "slot" in kind:
                 half = 0.5 * joint.get("travel", 0.0)
-                low, high = (-half, half) if half else travel(at.run, name)
+                low, high = (-half, half) if half else travel_range(at.run, name)
                 rim = surfaces.prism(surfaces.hull(np.array([[low, 0.0], [high, 0.0]]), SOCKET * radius), 0.5 * long)
                 yield at.part_at_frame(first, rim, SOCKET_COLOR, opacity=0.5)
             elif kind in SURFACES:
@@ -277,7 +277,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
             yield at.part_at_frame(second, surfaces.box(size_of_slider), color, contact)
             yield at.part_at_frame(first, _guide(at, joint, size_of_slider), SOCKET_COLOR, opacity=0.35)
         elif kind in forms.SLIDING:
-            low, high = travel(at.run, name)
+            low, high = travel_range(at.run, name)
             rail = surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size)
             middle = np.array([0.0, 0.0, 0.5 * (low + high)])
             yield at.part_at_frame(first, surfaces.place(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
@@ -294,7 +294,7 @@ def _path(at: Layout, joint: Mapping[str, Any]) -> np.ndarray:
     first, second = joint["between"]
     if at.owner(first) is not None or second not in at.frames:
         return np.zeros((1, 3))
-    origin, axes = at.local(first)
+    origin, axes = at.frame_in_body(first)
     return np.asarray((at.run.frame_position.values[:, at.frames.index(second)] - origin) @ axes)
 
 

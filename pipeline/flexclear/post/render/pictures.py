@@ -144,7 +144,7 @@ def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
 def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
     files = {}
     for body, bundle in _bodies(shown).items():
-        suffix, content = film_speed.write(mode_sheet.frames(body, bundle, *_side(bundle)), 12, kind)
+        suffix, content = film_speed.write(mode_sheet.film_frames(body, bundle, *_side(bundle)), 12, kind)
         files[f"modes_{body}.{suffix}"] = content
     return files
 
@@ -225,7 +225,7 @@ def _vibration_sheet(shown: Shown, kind: str) -> dict[str, bytes]:
     return {"vibrations.png": png(vibrations.sheet(*_vibrating_mechanism(shown)))}
 
 
-def _vibrations(shown: Shown, kind: str) -> dict[str, bytes]:
+def _draw_vibrations(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
     rate = film_speed.rate(kind)
     suffix, content = film_speed.write(
@@ -257,5 +257,5 @@ MAKERS: dict[str, dict[str, Maker]] = {
         "pvd": _mode_series,
     },
     "joint": {"png": _joint_figures, "gif": _joint_films, "mp4": _joint_films, "html": _joint_page},
-    "vibrations": {"png": _vibration_sheet, "gif": _vibrations, "mp4": _vibrations, "html": _vibration_page},
+    "vibrations": {"png": _vibration_sheet, "gif": _draw_vibrations, "mp4": _draw_vibrations, "html": _vibration_page},
 }

@@ -38,14 +38,14 @@ def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     meshes = []
     for part in drawn.parts:
         own = -1 if part.owner is None else track(part)
-        meshes.append(_still(part.surface, part.color, part.opacity) | {"track": own})
+        meshes.append(_still_part(part.surface, part.color, part.opacity) | {"track": own})
     for body in drawn.flexible:
         whole = layout.Part(body.index, surfaces.EMPTY, "")
-        meshes.append(_bent(run, body, steps) | {"track": track(whole)})
+        meshes.append(_flexible_track(run, body, steps) | {"track": track(whole)})
     tracks_of = [_track(run, part, steps) for _, part in tracks.values()]
     return {
         "meshes": meshes,
-        "tracks": [_floats(track) for track in tracks_of],
+        "tracks": [_encode_floats(track) for track in tracks_of],
         "times": _rounded_times(run, steps),
         "rate": len(steps) / (drawn.looks.duration or film_speed.SECONDS),
         "exaggeration": max((body.scale for body in drawn.flexible), default=1.0),
@@ -77,11 +77,11 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, An
     ]
     return {
         "meshes": [
-            _still(shown.path, joint_view.PATH_COLOR, 1.0) | {"track": -1},
-            _still(shown.mark, layout.CLEARANCE_COLOR, 1.0) | {"track": 0},
-            _still(shown.room, layout.SOCKET_COLOR, 0.3) | {"track": -1},
+            _still_part(shown.path, joint_view.PATH_COLOR, 1.0) | {"track": -1},
+            _still_part(shown.mark, layout.CLEARANCE_COLOR, 1.0) | {"track": 0},
+            _still_part(shown.room, layout.SOCKET_COLOR, 0.3) | {"track": -1},
         ],
-        "tracks": [_floats(np.column_stack([centre, unturned]))],
+        "tracks": [_encode_floats(np.column_stack([centre, unturned]))],
         "times": _rounded_times(run, steps),
         "rate": len(steps) / (looks.duration or film_speed.SECONDS),
         "readings": readings,
@@ -117,7 +117,7 @@ def vibrations(drawn: mechanism.Mechanism, linear: Vibrations) -> dict[str, Any]
     """
     meshes = []
     for piece in linear.pieces:
-        mesh = _still(piece.surface, piece.color, piece.opacity) | {"track": -1, "plain": piece.plain}
+        mesh = _still_part(piece.surface, piece.color, piece.opacity) | {"track": -1, "plain": piece.plain}
         if piece.moved.any():
             mesh["fields"] = [_as_16_bits(f) for f in piece.moved.reshape(-1, *piece.moved.shape[2:])]
             mesh.pop("normals")
@@ -153,14 +153,14 @@ def _rounded_times(run: xr.Dataset, steps: np.ndarray) -> list[float]:
     return [round(float(t), 9) for t in run["time"].values[steps]]
 
 
-def _bent(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[str, Any]:
+def _flexible_track(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[str, Any]:
     bundle, q = body.bundle, run["modal_coordinate"].values[:, body.columns]
     fields = linear_fields(bundle)
     some = np.unique(np.linspace(0, len(q) - 1, 60).astype(int))
     largest = max(float(np.linalg.norm(np.tensordot(q[k], fields, axes=1), axis=1).max()) for k in some)
     content = _skin(bundle, mechanism.rest(bundle)) | {
         "fields": [_as_16_bits(values) for values in fields],
-        "weights": _floats(q[steps]),
+        "weights": _encode_floats(q[steps]),
         "largest": largest,
     }
     if body.stressed:  # one byte for each point and frame
@@ -182,11 +182,11 @@ def _track(run: xr.Dataset, part: layout.Part, steps: np.ndarray) -> np.ndarray:
     return np.array(rows)
 
 
-def _still(part: surfaces.Surface, color: str, opacity: float) -> dict[str, Any]:
+def _still_part(part: surfaces.Surface, color: str, opacity: float) -> dict[str, Any]:
     return {
-        "points": _floats(part.points),
-        "normals": _floats(part.normals),
-        "triangles": _wholes(part.triangles),
+        "points": _encode_floats(part.points),
+        "normals": _encode_floats(part.normals),
+        "triangles": _encode_integers(part.triangles),
         "color": color,
         "opacity": opacity,
     }
@@ -195,7 +195,12 @@ def _still(part: surfaces.Surface, color: str, opacity: float) -> dict[str, Any]
 def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
     """Return a skin whose points keep their number, so that fields fit; sharp edges of solids are shaded softly."""
     triangles = surfaces.triangulate(faces(bundle))
-    return {"points": _floats(points), "triangles": _wholes(triangles), "color": mechanism.COLORS[0], "opacity": 1.0}
+    return {
+        "points": _encode_floats(points),
+        "triangles": _encode_integers(triangles),
+        "color": mechanism.COLORS[0],
+        "opacity": 1.0,
+    }
 
 
 def _camera(view: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
@@ -206,11 +211,11 @@ def _camera(view: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
     return {"eye": position.tolist(), "focus": focus.tolist(), "up": view.up.tolist(), "reach": reach.tolist()}
 
 
-def _floats(values: np.ndarray) -> str:
+def _encode_floats(values: np.ndarray) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
 
 
-def _wholes(values: np.ndarray) -> str:
+def _encode_integers(values: np.ndarray) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype="<u4").tobytes()).decode()
 
 

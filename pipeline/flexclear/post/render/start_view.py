@@ -289,7 +289,7 @@ def picture(start: StartView, title: str) -> np.ndarray:
         left_out = [] if shown == len(start.marks) else [f"{shown} of {len(start.marks)} names; the page has all"]
         notes = " · ".join([*start.notes, *left_out])
         write(20, 49, notes, fontsize=9.5, color=style.SOFT)
-        _directions(axes, start.drawn, start.gravity)
+        _draw_directions(axes, start.drawn, start.gravity)
         ruler(axes, start.drawn, SIZE, MARGIN)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
@@ -351,7 +351,7 @@ def heights(requested: np.ndarray, line: float, top: float, bottom: float) -> np
     return result
 
 
-def _directions(axes: style.Axes, drawn: Mechanism, gravity: np.ndarray) -> None:
+def _draw_directions(axes: style.Axes, drawn: Mechanism, gravity: np.ndarray) -> None:
     """Draw the world's axes and gravity, as projected in the picture."""
     middle = drawn.cloud.mean(axis=0)
     directions = [(np.eye(3)[k], "xyz"[k], style.SOFT) for k in range(3)]

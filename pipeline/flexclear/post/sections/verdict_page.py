@@ -92,10 +92,10 @@ def make(sections: xr.Dataset, verdict: xr.Dataset) -> dict[str, bytes]:
     with style.style():
         figure, axes = style.grid(1, 4, (13.2, 3.9))
         section, returns, power, growth = axes[0]
-        _section(section, verdict)
-        _returns(returns, verdict)
-        _power(power, verdict)
-        _growth(growth, sections, verdict)
+        _draw_section(section, verdict)
+        _draw_returns(returns, verdict)
+        _draw_power(power, verdict)
+        _draw_growth(growth, sections, verdict)
         style.heading(
             figure,
             f"A {verdict.attrs['verdict']} motion" if verdict.attrs["verdict"] != "undecided" else "Undecided",
@@ -104,14 +104,14 @@ def make(sections: xr.Dataset, verdict: xr.Dataset) -> dict[str, bytes]:
         return style.files("sections", figure)
 
 
-def _section(axes: Axes, verdict: xr.Dataset) -> None:
+def _draw_section(axes: Axes, verdict: xr.Dataset) -> None:
     shown = verdict.principal.values
     other = shown[:, 1] if shown.shape[1] > 1 else np.zeros(len(shown))
     axes.scatter(shown[:, 0], other, **POINT)  # type: ignore[arg-type]
     axes.set(title="section", xlabel="along the largest variance", ylabel="along the second largest")
 
 
-def _returns(axes: Axes, verdict: xr.Dataset) -> None:
+def _draw_returns(axes: Axes, verdict: xr.Dataset) -> None:
     first = verdict.principal.values[:, 0]
     low, high = float(first.min()), float(first.max())
     axes.plot([low, high], [low, high], color=LIGHT, lw=1.0, zorder=1)
@@ -119,7 +119,7 @@ def _returns(axes: Axes, verdict: xr.Dataset) -> None:
     axes.set(title="return map", xlabel="this period", ylabel="next period")
 
 
-def _power(axes: Axes, verdict: xr.Dataset) -> None:
+def _draw_power(axes: Axes, verdict: xr.Dataset) -> None:
     axes.set(title="spectrum", xlabel="cycles per period", ylabel="fraction of the variance")
     if not verdict.power.values.any():
         axes.text(0.5, 0.5, "the states are constant", transform=axes.transAxes, ha="center", color=style.SOFT)
@@ -130,7 +130,7 @@ def _power(axes: Axes, verdict: xr.Dataset) -> None:
     axes.set_ylim(bottom=max(1e-16, axes.get_ylim()[0]))
 
 
-def _growth(axes: Axes, sections: xr.Dataset, verdict: xr.Dataset) -> None:
+def _draw_growth(axes: Axes, sections: xr.Dataset, verdict: xr.Dataset) -> None:
     grown = np.cumsum(sections.growth.values)
     number = np.arange(1, len(grown) + 1)
     axes.plot(number, grown, color=COLOR)

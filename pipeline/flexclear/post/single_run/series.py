@@ -15,7 +15,7 @@ import numpy as np
 from flexclear.artifacts.labelled import LabelledArrays, label_arrays, of
 from flexclear.artifacts.quantities import IMPACT, PERTURBATION, SEPARATED, separated_from
 from flexclear.artifacts.schema import conform_arrays, require_complete
-from flexclear.numerics.rotations import angle_about_y, first_largest, rotation_between
+from flexclear.numerics.rotations import angle_about_y, index_of_largest, rotation_between
 from flexclear.post.single_run.schema import POST
 
 if TYPE_CHECKING:
@@ -102,9 +102,9 @@ def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Arrays:
     arrays: Arrays = {}
     for name, values in series.items():
         arrays[f"peak_{name}"] = values.max(axis=0, initial=0.0)
-        arrays[f"peak_{name}_time"] = run["time"].values[first_largest(values, axis=0)]
+        arrays[f"peak_{name}_time"] = run["time"].values[index_of_largest(values, axis=0)]
     if "von_mises_stress" in run:
-        at = first_largest(run["von_mises_stress"].values, axis=0)
+        at = index_of_largest(run["von_mises_stress"].values, axis=0)
         gauges = np.arange(len(at))
         arrays["peak_stress"] = run["von_mises_stress"].values[at, gauges]
         arrays["peak_stress_time"] = run["time"].values[at]
@@ -176,7 +176,7 @@ def impacts(run: xr.Dataset | LabelledArrays) -> Arrays:
         "impact_peak_force": run["event_peak_force"].values[strong],
         "impact_duration": np.where(ended, run["event_time"].values[opens] - begun, np.nan),
         "impact_count": np.array([np.count_nonzero(contact[strong] == name) for name in names], dtype=np.int64),
-        **_books(run, contact[strong], begun, np.where(ended, run["event_time"].values[opens], np.nan)),
+        **_impulses_and_losses(run, contact[strong], begun, np.where(ended, run["event_time"].values[opens], np.nan)),
     }
 
 
@@ -188,7 +188,9 @@ BOOKS = {
 }
 
 
-def _books(run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray) -> Arrays:
+def _impulses_and_losses(
+    run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray
+) -> Arrays:
     """Return impulse and losses of each impact, NaN where it has not ended; the run has rows at all events."""
     time, booked = run["time"].values, Arrays()
     for name, book in BOOKS.items():
@@ -308,7 +310,7 @@ def horizon(time: np.ndarray, velocity: np.ndarray, speed: float = 0.0) -> float
     return float(time[-1] if first is None else time[first])
 
 
-def sentence(horizon: float, end: float, members: float | None = None) -> str:
+def horizon_sentence(horizon: float, end: float, members: float | None = None) -> str:
     """Return a statement on a run's predictability horizon [s]; end: of the run [s].
 
     members: horizon of its ensemble [s], which may start further from the run than the perturbed run does.

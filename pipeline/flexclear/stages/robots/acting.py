@@ -174,7 +174,7 @@ def take_actuators(at: Assembly, control: np.ndarray, activation: np.ndarray) ->
         return
     for a in range(model.nactuator):
         name = at.name(OBJECT.mjOBJ_ACTUATOR, a, "actuator")
-        why = _unlike(model, a)
+        why = _why_no_counterpart(model, a)
         on_site = model.actuator_trntype[a] == TRANSMISSION.mjTRN_SITE
         one = None if on_site else at.joints.get(model.actuator_trnid[a][0])
         if why is None and one is not None and not one.single:
@@ -197,7 +197,7 @@ def take_actuators(at: Assembly, control: np.ndarray, activation: np.ndarray) ->
             _push_joint(at, a, name, one, u)
 
 
-def _unlike(model: Any, a: int) -> str | None:
+def _why_no_counterpart(model: Any, a: int) -> str | None:
     """Return why an actuator has no counterpart, or None."""
     gain, bias = GAIN(int(model.actuator_gaintype[a])), BIAS(int(model.actuator_biastype[a]))
     dynamics, via = DYNAMICS(int(model.actuator_dyntype[a])), TRANSMISSION(int(model.actuator_trntype[a]))

@@ -41,7 +41,7 @@ def scene_of(robot: Robot, source: Path, stem: str) -> tuple[str, dict[str, byte
     take_actuators(at, *((model.key_ctrl[0], model.key_act[0]) if key else (np.zeros(model.nu), np.zeros(model.na))))
     files = take_geometry(at, f"{stem}_surfaces")
     starts = take_start(at)
-    draft.lost += _unlike(model)
+    draft.lost += _lines_without_counterpart(model)
     if len(draft.parts["body"]) == 1:
         raise InputError(str(source), "holds no body that moves", "name the robot's own file")
     top = {"title": _title(model, source), "time": TIME, "output": OUTPUT}
@@ -69,7 +69,7 @@ def _head(robot: Robot, source: Path, stem: str, draft: Draft) -> Iterator[str]:
     yield ""
 
 
-def _unlike(model: Any) -> Iterator[str]:
+def _lines_without_counterpart(model: Any) -> Iterator[str]:
     """Yield what of a model has no counterpart in a scene."""
     touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
     if (touching or model.npair) and not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:

@@ -75,7 +75,7 @@ class Engine:
                 enough = together or (left >= POINTS_TOGETHER * width and left * evaluations >= WORTH_CODE)
                 together = evaluations >= WORTH_TOGETHER and enough
                 mine = _take(waiting, _portion(left, seconds_each, width, together) if seconds_each else 1)
-                running[self._given(mine, families, others_idle=not seconds_each, together=together)] = mine
+                running[self._submit_safely(mine, families, others_idle=not seconds_each, together=together)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
@@ -96,7 +96,9 @@ class Engine:
                 first, lost = not seconds_each, 0  # the first batch's time includes compiling and fetching
                 seconds_each = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
 
-    def _given(self, mine: list[Job], families: dict[str, bytes], *, others_idle: bool, together: bool) -> Future[Any]:
+    def _submit_safely(
+        self, mine: list[Job], families: dict[str, bytes], *, others_idle: bool, together: bool
+    ) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
         try:
             return self.submit(family, families[family], points, others_idle, together)

@@ -80,7 +80,7 @@ def write(path: Path, slabs: Iterator[xr.Dataset], along: str) -> None:
         os.replace(unfinished, path)
 
 
-def written(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> xr.Dataset:
+def write_points(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> xr.Dataset:
     """Write the dataset of the points in the store to `path` and open it there; values are read on access.
 
     done: the finished points, without their values.

@@ -82,11 +82,11 @@ def work(
     threadpool_limits(1)  # NumPy may have been loaded with more threads
     scene, runner = _open_family(key, packed)
     begun = time.process_time()
-    results = _together(runner, scene, points) if together else [_point(runner, scene, point) for point in points]
+    results = _run_together(runner, scene, points) if together else [_point(runner, scene, point) for point in points]
     return results, time.process_time() - begun
 
 
-def _together(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]]) -> list[Point]:
+def _run_together(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]]) -> list[Point]:
     """Run points concurrently, each in a thread, where batched evaluation is possible."""
     places = runner.places(scene, len(points))
 

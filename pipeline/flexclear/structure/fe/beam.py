@@ -25,7 +25,7 @@ import xarray as xr
 from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
 from flexclear.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
-from flexclear.structure.fe.model import DOFS, rigid_displacements, rigid_motions, selection, symmetric
+from flexclear.structure.fe.model import DOFS, rigid_displacements, rigid_motions, selection, symmetric_part
 from flexclear.structure.fe.section import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
@@ -193,4 +193,4 @@ def _lumped_mass(mesh: xr.Dataset, size: int) -> sp.csr_array:
 
 
 def _in_vector_order(matrix: Any, to_fields: sp.csr_array) -> sp.csr_array:
-    return symmetric(to_fields.T @ sp.csr_array(matrix) @ to_fields)
+    return symmetric_part(to_fields.T @ sp.csr_array(matrix) @ to_fields)

@@ -45,7 +45,7 @@ def build(recipe: BeamRecipe, folder: Path, where: str) -> xr.Dataset:
     return conform(xr.Dataset(data, coords={"frame": names}), MESH, **_attributes(recipe, parts))
 
 
-def cut(mesh: xr.Dataset, segment: Sequence[int]) -> xr.Dataset:
+def cut_segment(mesh: xr.Dataset, segment: Sequence[int]) -> xr.Dataset:
     """Return one segment of a rod's mesh, ``(k, n)`` being the k-th of n, with frames at its cut ends.
 
     A mass at a cut belongs to the segment that ends there. Interfaces of the whole rod at a cut are left out, since the
@@ -59,16 +59,16 @@ def cut(mesh: xr.Dataset, segment: Sequence[int]) -> xr.Dataset:
     near, far = ([name for name, node in ends.items() if node == end] for end in (first, last))
     interfaces = " ".join([*near, *(name for name in inside if nodes[name] not in ends.values()), *far])
     part = mesh.isel(node=slice(first, last + 1), cell=slice(first, last))
-    part = part.isel(frame=_between(mesh["frame_node"].values, first, last))
+    part = part.isel(frame=_entries_between(mesh["frame_node"].values, first, last))
     if "lump_node" in mesh:
-        carried = _between(mesh["lump_node"].values, first if k == 1 else first + 1, last)
+        carried = _entries_between(mesh["lump_node"].values, first if k == 1 else first + 1, last)
         part = part.isel(lump=carried) if carried.size else part.drop_dims("lump")
     part = xr.concat([part, _cut_ends(mesh, ends)], "frame", data_vars="minimal", coords="minimal")
     part = part.assign({name: part[name] - first for name in ("cell_node", "frame_node", "lump_node") if name in part})
     return conform(part, MESH, **{**mesh.attrs, "interfaces": interfaces})
 
 
-def _between(nodes: np.ndarray, first: int, last: int) -> np.ndarray:
+def _entries_between(nodes: np.ndarray, first: int, last: int) -> np.ndarray:
     """Return the indices of the entries whose nodes lie from `first` to `last`."""
     return np.flatnonzero((nodes >= first) & (nodes <= last))
 

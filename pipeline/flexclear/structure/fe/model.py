@@ -190,12 +190,12 @@ def rigid_motions(positions: np.ndarray, component: np.ndarray, about: np.ndarra
     return motion[np.arange(len(positions)), np.minimum(component, 6)]
 
 
-def symmetric(matrix: sp.csr_array) -> sp.csr_array:
+def symmetric_part(matrix: sp.csr_array) -> sp.csr_array:
     """Return the symmetric part: eigensolvers need exact symmetry; rounding differs above and below the diagonal."""
     return sp.csr_array(0.5 * (matrix + matrix.T))
 
 
-def strain(stiffness: sp.csr_array, rigid: np.ndarray) -> np.ndarray:
+def rigid_motion_force(stiffness: sp.csr_array, rigid: np.ndarray) -> np.ndarray:
     """Return the largest force of each rigid motion, relative to the largest term of the sums, shape (6,)."""
     left: np.ndarray = np.abs(stiffness @ rigid).max(axis=0) / (abs(stiffness) @ np.abs(rigid)).max(axis=0)
     return left

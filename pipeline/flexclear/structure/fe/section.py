@@ -87,12 +87,12 @@ def shape(types: tuple[str, ...], given: Section) -> tuple[str, tuple[float, ...
     """Return which of `types` a section with these constants has, and the lengths of that type; empty for none."""
     for name in types:
         lengths = SHAPES[name].lengths(given) if name in SHAPES else ()
-        if lengths and (len(types) == 1 or _is(SHAPES[name].constants(*lengths), given)):
+        if lengths and (len(types) == 1 or _has_moments_of(SHAPES[name].constants(*lengths), given)):
             return name, lengths
     return "", ()
 
 
-def _is(section: Section, given: Section) -> bool:
+def _has_moments_of(section: Section, given: Section) -> bool:
     a, b = (np.array([s.torsion, s.second_y, s.second_z], dtype=float) for s in (section, given))
     return bool(np.all(np.abs(a - b) <= SAME * b))
 

@@ -60,14 +60,14 @@ def support(model: Model, progress: Callable[[float], None]) -> Flexibility:
     try:
         factor = cholesky(inner, model.position[free], progress)
     except SolverError:
-        raise _mechanism() from None
+        raise _mechanism_error() from None
     if factor.smallest_pivot(inner.diagonal()) < PIVOT:
-        raise _mechanism()
+        raise _mechanism_error()
     momentum = model.mass @ model.rigid
     return Flexibility(model, factor, free, momentum, model.rigid.T @ momentum)
 
 
-def _mechanism() -> InputError:
+def _mechanism_error() -> InputError:
     return InputError(
         "mesh",
         "the body has more motions without strain than its six rigid ones, as where parts share only an edge or a node",

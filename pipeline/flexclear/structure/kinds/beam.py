@@ -32,7 +32,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         ends=_ends(mesh, beam),
         integrate=lambda vectors: integrate(slices(mesh, beam), vectors),
         families=_families(beam),
-        drawn=_drawn(mesh, beam),
+        drawn=_line_to_draw(mesh, beam),
     )
 
 
@@ -71,7 +71,7 @@ _TURN = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
 _CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 
 
-def _drawn(mesh: xr.Dataset, beam: Beam) -> Drawn:
+def _line_to_draw(mesh: xr.Dataset, beam: Beam) -> Drawn:
     radius, outline = _sections(mesh, beam)
     motion = selection(np.arange(beam.nodal_size), beam.size)
     return Drawn(beam.node_position, mesh["cell_node"].values, radius, motion, outline)
@@ -109,7 +109,7 @@ KIND = Kind(
     vtu=beam_mesh.as_vtu,
     assemble=assemble,
     words=lambda model, families, vectors: [name.partition("_")[0] for name in families],
-    cut=beam_mesh.cut,
+    cut=beam_mesh.cut_segment,
     exact=closed_form.columns,
     second_order=_second_order,
 )

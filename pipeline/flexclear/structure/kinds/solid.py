@@ -33,10 +33,10 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     swirl = np.cross(axis, radial)
     along, out, turn = (np.einsum("nk,nkj->nj", e, u) for e in (np.broadcast_to(axis, X.shape), radial, swirl))
     energy = [(part**2).sum(axis=0) for part in (along, out, turn)]
-    return [_word(*parts) for parts in zip(*energy, strict=True)]
+    return [_kind_of_mode(*parts) for parts in zip(*energy, strict=True)]
 
 
-def _word(along: float, out: float, turn: float) -> str:
+def _kind_of_mode(along: float, out: float, turn: float) -> str:
     # 4.0: a mode is torsion where the swirl about the axis has this many times the energy of all other motion
     if turn > 4.0 * (along + out):
         return "torsion"

@@ -83,10 +83,10 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
         _check_first(modes, static, requested)
         # the last cluster may continue beyond the computed modes
         for stop in ends if tried >= free else ends[:-1]:
-            if _enough(body, static, modes, stop, requested):
+            if _has_enough_modes(body, static, modes, stop, requested):
                 return _static_and_normal_shapes(body, static, modes, stop), modes.rigid_frequency
         if tried >= free:
-            raise _unreachable(body, static, modes, requested)
+            raise _unreachable_error(body, static, modes, requested)
         tried *= 2
 
 
@@ -167,7 +167,7 @@ def _check_first(modes: Normal, static: np.ndarray, requested: ModeRequest) -> N
         raise InputError("modes.up_to", problem, "request a higher frequency")
 
 
-def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, requested: ModeRequest) -> bool:
+def _has_enough_modes(body: Body, static: np.ndarray, modes: Normal, count: int, requested: ModeRequest) -> bool:
     if requested.up_to is not None:
         following = modes.values[count : count + 1]
         return bool(following.size == 0 or eigen.frequency(following)[0] > requested.up_to)
@@ -185,7 +185,7 @@ def _mass_fraction(model: Model, vectors: np.ndarray) -> float:
     return float((taken / np.einsum("nd,nd->d", model.rigid[:, :3], momentum)).min())
 
 
-def _unreachable(body: Body, static: np.ndarray, modes: Normal, requested: ModeRequest) -> InputError:
+def _unreachable_error(body: Body, static: np.ndarray, modes: Normal, requested: ModeRequest) -> InputError:
     vectors = _static_and_normal_shapes(body, static, modes, len(modes.values))
     if requested.compliance is not None:
         fraction, where = deficits.least(body.flexibility(), body.interfaces, vectors)

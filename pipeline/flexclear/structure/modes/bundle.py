@@ -61,7 +61,7 @@ def rigid_of(model: Model, title: str) -> xr.Dataset:
     return conform(_dataset(model, _rigid(model)), RIGID, title=f"Rigid body made of the mesh: {title}")
 
 
-def drawn(mesh: xr.Dataset) -> xr.Dataset:
+def rigid_drawing(mesh: xr.Dataset) -> xr.Dataset:
     """Return the rigid body with its drawn geometry and one mode at rest, for pictures without modes."""
     model = of_mesh(mesh).assemble(mesh)
     still = np.zeros((len(model.drawn.position), 3, 1))

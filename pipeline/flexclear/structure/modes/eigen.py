@@ -13,7 +13,7 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from flexclear.numerics.rotations import first_largest
+from flexclear.numerics.rotations import index_of_largest
 from flexclear.structure.fe.model import Model
 from flexclear.system.errors import InputError, SolverError
 
@@ -148,7 +148,7 @@ def family(model: Model, vectors: np.ndarray) -> list[str]:
     fraction = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
     totals = np.stack([fraction[families.member == k].sum(axis=0) for k in range(len(families.names))])
     # torsion of a solid has equal fractions along y and z
-    return [families.names[k] for k in first_largest(totals, axis=0)]
+    return [families.names[k] for k in index_of_largest(totals, axis=0)]
 
 
 def fix_signs(model: Model, vectors: np.ndarray, families: list[str]) -> np.ndarray:
@@ -160,5 +160,5 @@ def fix_signs(model: Model, vectors: np.ndarray, families: list[str]) -> np.ndar
     main = dict(zip(model.families.names, model.families.main, strict=True))
     for j, name in enumerate(families):
         component = model.families.local[main[name]] @ vectors[:, j]
-        result[:, j] *= np.sign(component[first_largest(np.abs(component))])
+        result[:, j] *= np.sign(component[index_of_largest(np.abs(component))])
     return result

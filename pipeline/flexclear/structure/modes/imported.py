@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.structure.fe.model import Model, strain
+from flexclear.structure.fe.model import Model, rigid_motion_force
 from flexclear.structure.fe.statics import Flexibility
 from flexclear.structure.modes import eigen, normal
 from flexclear.system.errors import InputError
@@ -48,7 +48,7 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
     six = inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
     lines = (
         f"matrices: symmetric to {mesh.attrs['asymmetry']:.1g}, both positive definite but for six rigid motions, "
-        f"which strain to {strain(model.stiffness, model.rigid).max():.1g} of the largest term",
+        f"which strain to {rigid_motion_force(model.stiffness, model.rigid).max():.1g} of the largest term",
         f"mass {mass:.7g} kg" + (f" ({stated:.7g} kg in the program's file)" if np.isfinite(stated) else ""),
         f"centre of mass {_number_list(centre)} m",
         f"inertia about it, xx yy zz yz xz xy {_number_list(six)} kg m^2",

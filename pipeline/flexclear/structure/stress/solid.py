@@ -141,7 +141,7 @@ def _gauges(mesh: xr.Dataset, shown: np.ndarray, gauges: Mapping[str, Mapping[st
     for name, gauge in gauges.items():
         where = f"[output.gauges.{name}]"
         if gauge.get("position") is not None:
-            found[name] = np.array([_nearest(mesh["node_position"].values[shown], gauge["position"], where)])
+            found[name] = np.array([_nearest_node(mesh["node_position"].values[shown], gauge["position"], where)])
             continue
         kind = "frame" if gauge.get("frame") is not None else "region"
         dim, nodes, index = CHOSEN[kind]
@@ -155,7 +155,7 @@ def _gauges(mesh: xr.Dataset, shown: np.ndarray, gauges: Mapping[str, Mapping[st
     return found
 
 
-def _nearest(x: np.ndarray, position: tuple[float, float, float], where: str) -> int:
+def _nearest_node(x: np.ndarray, position: tuple[float, float, float], where: str) -> int:
     away = np.linalg.norm(x - np.array(position), axis=1)
     nearest = int(np.argmin(away))
     if away[nearest] > ASTRAY * float(np.ptp(x, axis=0).max()):

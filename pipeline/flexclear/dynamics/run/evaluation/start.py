@@ -17,7 +17,7 @@ from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.scene.drives import PathDrive
-from flexclear.system.errors import InputError, SolverError, together
+from flexclear.system.errors import InputError, SolverError, all_or_errors
 
 #: impact rate of a contact at rest: its damping no longer depends on the past impact [m/s]
 NO_IMPACT = 1e300
@@ -30,7 +30,7 @@ def consistent_start(engine: Engine) -> np.ndarray:
     """
     y = closed_start(engine)
     model, depths = engine.model, overlap_depths(engine, y).items()
-    together(partial(refuse_depth, model.scene, model.contacts[c], depth) for c, depth in depths)
+    all_or_errors(partial(refuse_depth, model.scene, model.contacts[c], depth) for c, depth in depths)
     return y
 
 

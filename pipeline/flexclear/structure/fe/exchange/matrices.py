@@ -129,7 +129,7 @@ def _symmetric(matrix: sp.csr_array, name: str, where: str) -> tuple[sp.coo_arra
     away = float(abs(matrix - matrix.T).max() / abs(matrix).max())
     if away > SYMMETRIC:
         raise InputError(where, f"the {name} matrix is not symmetric: entries differ by {away:.2g} of the largest")
-    return sp.coo_array(models.symmetric(matrix)), away
+    return sp.coo_array(models.symmetric_part(matrix)), away
 
 
 def _frames(recipe: MatricesRecipe, contents: Contents, position: np.ndarray, path: str) -> dict[str, Any]:
@@ -137,7 +137,7 @@ def _frames(recipe: MatricesRecipe, contents: Contents, position: np.ndarray, pa
     for name, frame in recipe.frames.items():
         chosen, where = frame.nodes or (frame.node,), f"{path} [frames.{name}]"
         if frame.set is not None:
-            chosen = _set(contents.sets, frame.set, where)
+            chosen = _node_set(contents.sets, frame.set, where)
         single = frame.node is not None or (frame.set is not None and len(chosen) == 1)
         needed, remedy = (6, "tie the frame to the mean of `nodes`") if single else (3, "name others")
         for node in chosen:
@@ -165,7 +165,7 @@ def _frames(recipe: MatricesRecipe, contents: Contents, position: np.ndarray, pa
     }
 
 
-def _set(sets: dict[str, np.ndarray], name: str, where: str) -> tuple[int, ...]:
+def _node_set(sets: dict[str, np.ndarray], name: str, where: str) -> tuple[int, ...]:
     known = {other.upper(): other for other in sets}
     if name.upper() not in known:
         remedy = suggestion(name, sets) if sets else "give `nodes`, a deck with node sets"
@@ -186,7 +186,7 @@ def assemble(mesh: xr.Dataset) -> Model:
     positions, n = mesh["unknown_position"].values, mesh.sizes["unknown"]
     K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
     rigid = models.rigid_motions(positions, component, positions.mean(axis=0))
-    _check(K, M, rigid, positions)
+    _check_matrices(K, M, rigid, positions)
     frames = models.interfaces(mesh, partial(frame_motion, mesh, component))
     names = mesh.attrs["interfaces"].split()
     return Model(
@@ -198,7 +198,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         ends=tuple(frame for name in names[:2] for frame in frames if frame.name == name),
         integrate=_integrate(mesh, M, component),
         families=families(positions, component),
-        drawn=_drawn(mesh, component),
+        drawn=_points_to_draw(mesh, component),
         given=mesh["given_shape"].values if "given_shape" in mesh else None,
     )
 
@@ -208,8 +208,8 @@ def _matrix(mesh: xr.Dataset, name: str, n: int) -> sp.csr_array:
     return sp.csr_array(sp.coo_array((value, (row, column)), shape=(n, n)))
 
 
-def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, positions: np.ndarray) -> None:
-    left = models.strain(K, rigid)
+def _check_matrices(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, positions: np.ndarray) -> None:
+    left = models.rigid_motion_force(K, rigid)
     if left.max() > UNSTRAINED:
         worst = COMPONENTS[int(np.argmax(left))]
         problem = f"a rigid motion along {worst} strains the body ({left.max():.2g} of the largest term)"
@@ -305,7 +305,7 @@ def nodal_loads(mesh: xr.Dataset) -> dict[str, list[tuple[str, int, np.ndarray]]
     return found
 
 
-def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:
+def _points_to_draw(mesh: xr.Dataset, component: np.ndarray) -> Drawn:
     """Return the nodes as points to draw; components that a node lacks are drawn at rest."""
     numbers, first, index = np.unique(mesh["unknown_node"].values, return_index=True, return_inverse=True)
     count, position = len(numbers), mesh["unknown_position"].values[first]

@@ -118,7 +118,7 @@ def _of_cards(path: Path, where: str) -> Nodes:
                 refuse(path, number, where, problem, "write CP and CD in the basic system")
         if name == "GRID":
             with record(path, number, where):
-                nodes.position[int(values[0])] = tuple(real(value) for value in values[2:5])
+                nodes.position[int(values[0])] = tuple(parse_real(value) for value in values[2:5])
         if name == "SET1":
             with record(path, number, where):
                 label, *members = [value.upper() for value in values if value]
@@ -167,7 +167,7 @@ def _fields(text: str) -> tuple[str, list[str]]:
     return head, [text[8 + size * k : 8 + size * (k + 1)].strip() for k in range(width)]
 
 
-def real(text: str) -> float:
+def parse_real(text: str) -> float:
     """Return a number of Nastran: 1.5, 1.5D-3, 1.5-3; an empty field is zero."""
     return float(BARE.sub(r"\1E\2", text.strip().upper().replace("D", "E"))) if text.strip() else 0.0
 

@@ -138,10 +138,12 @@ def _columns(path: Path) -> Entries:
     whole = index.astype(np.int64)
     if held.shape[1] == 3:
         return Entries(whole[:, 0] - 1, whole[:, 1] - 1, held[:, 2], False, path.name)
-    return Entries(key(whole[:, 0], whole[:, 1]), key(whole[:, 2], whole[:, 3]), held[:, 4], True, path.name)
+    return Entries(
+        node_keys(whole[:, 0], whole[:, 1]), node_keys(whole[:, 2], whole[:, 3]), held[:, 4], True, path.name
+    )
 
 
-def key(node: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def node_keys(node: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return keys of nodes and directions 1 to 6; raise ValueError for others."""
     wrong = np.flatnonzero((direction < 1) | (direction > 6))
     if len(wrong):
@@ -164,16 +166,16 @@ def _dmig(path: Path, letter: str, where: str) -> Entries:
                 at = int(values[1]), int(values[2])
                 rows = [values[k : k + 3] for k in range(4, len(values) - 2, 4) if values[k]]
                 places += [(*at, int(node), int(direction)) for node, direction, _ in rows]
-                entries += [nodes.real(value) for _, _, value in rows]
+                entries += [nodes.parse_real(value) for _, _, value in rows]
             elif values[2] not in ("1", "6") or values[3] not in ("1", "2"):
                 problem = f"{values[0]} has form {values[2]} and type {values[3]}"
                 nodes.refuse(path, number, where, problem, "write a square and real matrix")
-    _one(names, letter)
+    _require_one(names, letter)
     node, direction, row, of_row = np.array(places, dtype=np.int64).reshape(-1, 4).T
-    return Entries(key(row, of_row), key(node, direction), np.array(entries), True, path.name)
+    return Entries(node_keys(row, of_row), node_keys(node, direction), np.array(entries), True, path.name)
 
 
-def _one(names: Iterable[str], letter: str) -> None:
+def _require_one(names: Iterable[str], letter: str) -> None:
     """Raise ValueError unless there is one name."""
     found = sorted(names)
     if len(found) != 1:
@@ -196,7 +198,7 @@ def _output4(path: Path, letter: str, where: str) -> Entries:
             content = _of_output4(file, int(columns), int(width), path, where)
             if name.upper().startswith(letter):
                 found[name] = content
-    _one(found, letter)
+    _require_one(found, letter)
     (entries,) = found.values()
     row, column, value = (np.array(part) for part in entries)
     return Entries(row - 1, column - 1, value, False, path.name)
@@ -215,7 +217,7 @@ def _of_output4(
             if "." in line and column > columns:
                 return rows, at, values
             if "." in line:
-                new = [nodes.real(line[k : k + width]) for k in range(0, len(line.rstrip()), width)]
+                new = [nodes.parse_real(line[k : k + width]) for k in range(0, len(line.rstrip()), width)]
                 values += new
                 rows += range(row, row + len(new))
                 at += [column] * len(new)
@@ -234,7 +236,7 @@ def _ansys(path: Path, letter: str, where: str) -> Entries:
     if data["held"]:
         problem = f"constraints hold {data['held']} unknowns of '{path.name}', which its matrices lack"
         raise InputError(where, problem, "write the free body, without supports")
-    keys = key(data["node"].astype(np.int64), data["component"].astype(np.int64) + 1)
+    keys = node_keys(data["node"].astype(np.int64), data["component"].astype(np.int64) + 1)
     name = {"K": "stiffness", "M": "mass"}[letter]
     row, column = (keys[data[f"{name}_{part}"]] for part in ("row", "column"))
     return Entries(row, column, data[f"{name}_value"], True, path.name)
@@ -245,7 +247,7 @@ def unknowns(path: Path, where: str) -> np.ndarray:
     require_file(path, where)
     with reading(path, where, f"'{path.name}' is no list of node.direction", AGAIN):
         pairs = np.array([line.split(".") for line in path.read_text(encoding="ascii").split()], dtype=np.int64)
-        return key(*pairs.reshape(-1, 2).T)
+        return node_keys(*pairs.reshape(-1, 2).T)
 
 
 def read_listing(path: Path, where: str) -> tuple[np.ndarray, float | None]:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from flexclear.structure.fe.model import symmetric
+from flexclear.structure.fe.model import symmetric_part
 from flexclear.structure.fe.solid.elements import ELEMENTS, Sampled, sample_element
 from flexclear.system.errors import InputError
 
@@ -60,7 +60,7 @@ def stiffness(solid: Solid) -> sp.csr_array:
             for j in range(3):
                 data[:, i, j] += np.bincount(index, K[:, :, i, :, j].ravel(), minlength=len(data))
     blocks = sp.bsr_array((data, indices, indptr), shape=(3 * n, 3 * n))
-    return symmetric(blocks.tocsr())
+    return symmetric_part(blocks.tocsr())
 
 
 def mass(solid: Solid) -> sp.csr_array:
@@ -73,7 +73,7 @@ def mass(solid: Solid) -> sp.csr_array:
         weight = _jacobian(solid, part, at)[0] * at.weight * solid.density[part][:, None]
         index = pairs[part].ravel()
         data += np.bincount(index, (weight @ products).ravel(), minlength=len(data))
-    return symmetric(sp.csr_array((data, indices, indptr), shape=(n, n)))
+    return symmetric_part(sp.csr_array((data, indices, indptr), shape=(n, n)))
 
 
 def stress_stiffness(solid: Solid, displacement: np.ndarray) -> sp.csr_array:
@@ -93,7 +93,7 @@ def stress_stiffness(solid: Solid, displacement: np.ndarray) -> sp.csr_array:
         pulled = (gradient @ stress) * weight[..., None, None]
         K = np.einsum("cqai,cqbi->cab", pulled, gradient, optimize=True)
         data += np.bincount(pairs[part].ravel(), K.ravel(), minlength=len(data))
-    return symmetric(sp.csr_array((data, indices, indptr), shape=(n, n)))
+    return symmetric_part(sp.csr_array((data, indices, indptr), shape=(n, n)))
 
 
 def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) -> None:

@@ -24,7 +24,7 @@ def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
     where = f"{path} [shape]"
     shape = recipe.shape
     if isinstance(shape, StepFile):
-        geometry = step.read(shape, folder, where)
+        geometry = step.mesh_step_file(shape, folder, where)
     elif isinstance(shape, MeshFile):
         geometry = imported.read_geometry(shape, folder, where)
     else:

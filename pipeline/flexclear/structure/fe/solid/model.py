@@ -51,8 +51,8 @@ def assemble(mesh: xr.Dataset) -> Model:
     recipe = mesh.attrs["interfaces"].split()
     ends = tuple(frame for name in recipe[:2] for frame in frames if frame.name == name)
     return Model(
-        stiffness=models.symmetric(K),
-        mass=models.symmetric(M),
+        stiffness=models.symmetric_part(K),
+        mass=models.symmetric_part(M),
         rigid=models.rigid_motions(unknowns.position, unknowns.component, unknowns.position.mean(axis=0)),
         position=unknowns.position,
         interfaces=frames,

@@ -100,7 +100,7 @@ def open_step(path: Path, where: str) -> Iterator[Any]:
         gmsh.finalize()
 
 
-def read(shape: StepFile, folder: Path, where: str) -> Geometry:
+def mesh_step_file(shape: StepFile, folder: Path, where: str) -> Geometry:
     """Mesh a solid of a STEP file; raise InputError for a file without it, ResourceError for too fine a mesh."""
     path = folder / shape.file
     with open_step(path, where) as gmsh:
@@ -172,8 +172,8 @@ def _merge_cylinders(pieces: list[tuple[Round, float]]) -> Iterator[Round]:
     rest = list(pieces)
     while rest:
         first = rest[0][0]
-        mine = [one for one in rest if _same(first, one[0])]
-        rest = [one for one in rest if not _same(first, one[0])]
+        mine = [one for one in rest if _is_same_cylinder(first, one[0])]
+        rest = [one for one in rest if not _is_same_cylinder(first, one[0])]
         ends = np.array(
             [float((r.centre - first.centre) @ first.axis) + h * r.length for r, _ in mine for h in (-0.5, 0.5)]
         )
@@ -184,7 +184,7 @@ def _merge_cylinders(pieces: list[tuple[Round, float]]) -> Iterator[Round]:
             yield Round(first.hole, middle, first.axis, first.radius, float(np.ptp(ends)))
 
 
-def _same(a: Round, b: Round) -> bool:
+def _is_same_cylinder(a: Round, b: Round) -> bool:
     offset = b.centre - a.centre
     across = np.linalg.norm(offset - (offset @ a.axis) * a.axis)
     near = ALIKE * a.radius
