@@ -80,10 +80,11 @@ def test_a_model_has_the_same_colour_in_every_figure():
 
 
 def test_a_page_in_a_folder_has_its_files_next_to_it(tmp_path: Path) -> None:
-    page = b'<html><body><img alt="run" src="data:image/png;base64,AAAA"></body></html>'
+    page = b"<html><body><img alt='run' src='data:image/png;base64,AAAA'></body></html>"
     index = publish_page(tmp_path / "runs" / "ball", "report", page, folder=True)
     assert index == tmp_path / "runs" / "ball" / "report" / "index.html"
-    assert index.is_file()
+    assert index.read_bytes() == b"<html><body><img alt='run' src='files/001.png'></body></html>"
+    assert (index.parent / "files" / "001.png").read_bytes() == bytes(3)
 
 
 def test_a_budget_that_reaches_one_effect_names_the_others() -> None:

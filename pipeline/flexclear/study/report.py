@@ -97,8 +97,8 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
     if not folder:
         publish(where / f"{name}.html", page)
         return where / f"{name}.html"
-    (where / name).mkdir(parents=True, exist_ok=True)
     for file, content in in_folder(page).items():
+        (where / name / file).parent.mkdir(parents=True, exist_ok=True)
         publish(where / name / file, content)
     return where / name / "index.html"
 
