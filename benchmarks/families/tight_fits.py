@@ -8,6 +8,7 @@ their radial gap would be negative; the set of touching pairs is iterated.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ def pressed(clearance: float, depth: float) -> float:
     """Return the force [N] under a penetration [m], by finite elements."""
     pin, journal = Body(RADIUS, 0.02 * RADIUS, -(clearance + depth)), Body(RADIUS + clearance, 2.0 * RADIUS, 0.0)
     n, m = pin.stiffness.shape[0], journal.stiffness.shape[0]
-    K = bmat([[pin.stiffness, None], [None, journal.stiffness]], format="csr")
+    K: Any = bmat([[pin.stiffness, None], [None, journal.stiffness]], format="csr")
     held = pin.held | {n + k: value for k, value in journal.held.items()}
     u = np.zeros(n + m)
     u[list(held)] = list(held.values())
@@ -86,7 +87,7 @@ def pressed(clearance: float, depth: float) -> float:
     gap_of = csr_array((np.concatenate([-normal, normal]), (np.tile(rows, 2), places)), shape=(len(angles), n + m))
     touching = angles <= 2.0 * math.asin(math.sqrt(0.5 * depth / (clearance + depth)))
     for turn in range(60):
-        C = gap_of[touching][:, free]
+        C: Any = gap_of[touching][:, free]
         system = bmat([[K[free][:, free], C.T], [C, None]], format="csc")
         solved = splu(system).solve(np.concatenate([-(K @ u)[free], -clearance - (gap_of @ u)[touching]]))
         whole, push = u.copy(), np.zeros(len(angles))
@@ -128,9 +129,13 @@ def show(records: list[Record]) -> str:
         "clearance": lambda r: f"{1e6 * r['clearance']:.0f} um",
         "penetration": lambda r: f"{1e6 * r['depth']:.3g} um",
         "force by elements": lambda r: f"{1e-3 * r['force']:.4g} kN",
-        **{f"`{form}`": lambda r, form=form: f"{r[form]:.3f}" for form in LAWS},
+        **{f"`{form}`": partial(_ratio, form) for form in LAWS},
     }
     return table(records, columns)
+
+
+def _ratio(form: str, record: Record) -> str:
+    return f"{record[form]:.3f}"
 
 
 FAMILY = Family(
