@@ -141,7 +141,9 @@ def _section(
     more = [row for row in rows[name] if base is None or row not in rows[base]]
     own = [row for row in more if shared.get(row[0]) != row]
     known = ", ".join(row[0] for row in more if row not in own)
-    example = examples.pop(_kind(part), "")  # of two parts of one kind, the first has it
+    # of two parts of one kind with these keys, the first has it
+    fits = set(re.findall(r"^(\w+) =", examples.get(_kind(part), ""), re.M)) <= set(part.get("properties", {}))
+    example = examples.pop(_kind(part), "") if fits else ""
     texts = [f"## {_heading(name, part)}", entry]
     texts += [f"All keys of [{_heading(base, definitions[base])}](#{_anchor(base, definitions)})."] if base else []
     texts += [_list(own)] if own else []

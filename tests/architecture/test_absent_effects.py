@@ -155,7 +155,7 @@ def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
 
 
 def test_all_forms_of_normal_laws_may_be_composed() -> None:
-    assert set(FORMS) == set(contact_forms.FORMS)
+    assert set(FORMS) < set(contact_forms.FORMS)  # those of tight fits follow from the scene
 
 
 #: scenes whose bodies need no mesh

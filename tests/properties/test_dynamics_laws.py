@@ -99,7 +99,7 @@ def test_every_normal_law_is_tried_here() -> None:
     assert set(NORMAL) == set(normal.NORMAL_LAWS)
 
 
-@pytest.mark.parametrize("form", forms.FORMS)
+@pytest.mark.parametrize("form", ["elastic", "hysteretic", "linear-damper"])
 @given(stiffness=STIFF, exponent=EXPONENT, depth=st.floats(1e-9, 1e-3))
 def test_every_form_has_the_inverse_of_its_elastic_force(
     form: str, stiffness: float, exponent: float, depth: float

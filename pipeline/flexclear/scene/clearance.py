@@ -58,6 +58,11 @@ class _Normal(Part):
         """True when the elastic force follows from materials and radii."""
         return self.stiffness is None
 
+    @property
+    def kind(self) -> str:
+        """What code of the law depends on besides its name: form of a tight fit, or structure of an expression."""
+        return ""
+
 
 class Layer(Part):
     """Elastic layer on a rigid surface."""
@@ -90,6 +95,11 @@ class _Elastic(_Normal):
     def needs_materials(self) -> bool:
         """True when the elastic force follows from materials and radii."""
         return self.stiffness is None and self.layer is None
+
+    @property
+    def kind(self) -> str:
+        """Form of a tight fit."""
+        return self.form or ""
 
 
 class Hertz(_Elastic):
@@ -183,6 +193,11 @@ class NormalExpression(Part):
     def encoded(self) -> tuple[str, tuple[float, ...]]:
         """Structure and values of the expression (`scene.law_expressions`)."""
         return law_expressions.encoded(self.force, self.named, law_expressions.NORMAL)
+
+    @property
+    def kind(self) -> str:
+        """Structure of the expression."""
+        return self.encoded[0]
 
     def check(self, *, turning: bool = False) -> None:
         """Raise ValueError, in words, for an expression without meaning. turning: for the end of an angle."""

@@ -16,7 +16,6 @@ from flexclear.scene.expression import (
     check_unit,
     constants_of,
     fold,
-    measure,
     postfix,
     refuse_jump,
     require_used,
@@ -31,7 +30,7 @@ MOST_NORMAL, MOST_SLIDING = 10, 6
 
 
 def encoded(text: str, values: Mapping[str, Any], variables: Mapping[str, Local]) -> tuple[str, tuple[float, ...]]:
-    """Return structure and values of an expression; raise ValueError, in words, for one without meaning."""
+    """Return structure and values of an expression, whose units `check` checks; raise ValueError for no expression."""
     return _encoded(text, tuple(values.items()), tuple(variables.items()))[:2]
 
 
@@ -63,7 +62,6 @@ def _encoded(
         return known[name]
 
     steps = postfix(text, variable, constants)
-    measure(steps)
     for step in steps:
         refuse_jump(step)
     places = {id(one): f"c{k}" for k, one in enumerate(constants.values())}

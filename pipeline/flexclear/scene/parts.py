@@ -349,8 +349,8 @@ class Stop(OnCoordinate):
     def _complete(self) -> Self:
         if self.lower is None and self.upper is None:
             raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
-        if getattr(self.normal, "form", None) is not None:
-            raise ValueError(f"a stop has no radii, which the form '{self.normal.form}' needs; give normal.stiffness")
+        if form := getattr(self.normal, "form", None):
+            raise ValueError(f"a stop has no radii, which the form '{form}' needs; give normal.stiffness")
         if self.normal.needs_materials:
             raise ValueError("the stiffness of a stop is unknown: give normal.stiffness")
         if self.normal.needs_mass:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -118,12 +118,16 @@ def _power(exponent: float) -> Callable:
     return power
 
 
-def zeros(functions: Iterable[Callable[[float], Any]], low: float, high: float) -> list[float]:
-    """Return the sign changes of functions on a grid of powers, each place once, in ascending order."""
+def zeros(functions: Iterable[Callable], low: float, high: float, *others: Any) -> list[float]:
+    """Return the sign changes of f(x, *others) of functions on a grid of powers, each once, in ascending order."""
     grid, found = np.geomspace(low, high, 400).tolist(), list[float]()
     for f in functions:
-        signs = [f(x) > 0.0 for x in grid]
+        signs = [f(x, *others) > 0.0 for x in grid]
         pairs = zip(grid[:-1], grid[1:], signs[:-1], signs[1:], strict=True)
-        found += [root(f, a, b) for a, b, before, after in pairs if before != after]
+        found += [root(partial(_at, f, others), a, b) for a, b, before, after in pairs if before != after]
     found.sort()
     return [x for k, x in enumerate(found) if k == 0 or x > (1.0 + 1e-9) * found[k - 1]]
+
+
+def _at(f: Callable, others: tuple[Any, ...], x: float) -> float:
+    return float(f(x, *others))

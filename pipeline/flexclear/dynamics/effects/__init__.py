@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: joints that are always one link; others may become chains of joints in CHAIN (see `model.chain`)
 WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
 CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
-#: compiled forms of normal laws (`contact.form`)
+#: compiled forms of normal laws (`contact.form`) that every scene with contacts may have
 FORMS = ("elastic", "hysteretic", "linear-damper")
 #: laws of time that are polynomials throughout, or composed of other laws
 WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated", "delayed"}
@@ -88,7 +88,7 @@ def most_parts(scene: Scene) -> Parts:
     return Parts(
         joints=tuple(sorted({"free", *ideal, *chained})),
         surfaces=tuple(sorted({pair.contact.type for pair in scene.pairs().values()})),
-        forms=FORMS if _touches(scene) else (),
+        forms=(*FORMS, *_own_forms(scene)) if _touches(scene) else (),
         frictions=tuple(sorted({j.friction.kind for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),
         effects=tuple(sorted(" ".join([name, *known]) for name, known in kinds.items() if known is not None)),
@@ -102,6 +102,12 @@ def most_parts(scene: Scene) -> Parts:
 def _touches(scene: Scene) -> bool:
     """Return True when the scene has contacts, or effects with contacts."""
     return bool(scene.contacts()) or any(effect.touches and effect.kinds(scene) is not None for effect in EFFECTS)
+
+
+def _own_forms(scene: Scene) -> list[str]:
+    """Return the forms of tight fits, and the structures of expressions, of the scene's normal laws."""
+    laws = [part.normal for part in (*scene.contacts().values(), *scene.stop.values())]
+    return sorted({law.kind for law in laws} - {""})
 
 
 def _loops(scene: Scene) -> bool:

@@ -139,7 +139,7 @@ def resolve_law(joint: Clearance | End, mass: float | None, path: str) -> Resolv
     try:
         if normal.law == "expression":
             return expression.resolve(normal, mass, SHALLOW * joint.radius or joint.clearance)
-        tight = CONFORMING[normal.form](joint) if getattr(normal, "form", None) else None
+        tight = CONFORMING[normal.kind](joint) if normal.kind else None
         if tight is not None:
             stiffness = tight.stiffness
         elif not isinstance(joint, End):

@@ -24,7 +24,7 @@ def law_of(kind: str) -> Friction:
     def kinks(law: Any) -> tuple[float, float]:
         """Return the first two speeds at which the coefficient has kinks."""
         p = law.encoded[1]
-        found = zeros((lambda v, b=bend: b(v, 1.0, 0.0, p) for bend in bends), SPEEDS[0], SPEEDS[-1])
+        found = zeros(bends, SPEEDS[0], SPEEDS[-1], 1.0, 0.0, p)
         first, second, *_ = (*found, 0.0, 0.0)
         return first, second
 

@@ -84,7 +84,7 @@ def kinks(kind: str, values: tuple[float, ...], reach: float) -> list[float]:
     """Return the penetrations up to `reach` at which the slope of the elastic force jumps."""
     bends = list[Callable]()
     composed(kind, bends)
-    return zeros((lambda d, b=bend: b(d, 0.0, 1.0, values) for bend in bends), 1e-7 * reach, 10.0 * reach)
+    return zeros(bends, 1e-7 * reach, 10.0 * reach, 0.0, 1.0, values)
 
 
 @lru_cache(maxsize=1024)
