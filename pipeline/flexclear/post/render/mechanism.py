@@ -33,7 +33,7 @@ from flexclear.post.render.view import View, view
 from flexclear.post.shapes import body_shape
 from flexclear.post.shapes.body_shape import faces, scale_to, surface
 from flexclear.post.single_run.series import parameters
-from flexclear.scene.clearance import SURFACES
+from flexclear.scene.loose_joints import SURFACES
 from flexclear.system.errors import InputError
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
