@@ -10,6 +10,10 @@ from flexclear.scene.fields import FrameName, Length, Part, Positive, Speed
 from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Seat, facing
 
 
+#: approach speed of a contact
+Rate = Annotated[Speed, Field(ge=0.0)]
+
+
 class _Contact(Part):
     """Keys of all contacts between surfaces."""
 
@@ -106,7 +110,8 @@ class _Worn(_Clearance):
 class Pin(_Clearance):
     """Keys of all joints of a pin, whose surfaces meet along a line."""
 
-    held, plane = "planar", (0, 1)
+    held: ClassVar[str | None] = "planar"
+    plane = (0, 1)
     pin_radius: Annotated[Length, Positive]
     """radius of the pin"""
     length: Annotated[Length, Positive]
@@ -127,7 +132,7 @@ class ClearanceSpherical(_Ball, _Worn):
 class _Several(_Contact):
     """Keys of joints that may have several contacts."""
 
-    initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | dict[str, Annotated[Speed, Field(ge=0.0)]] | None = None
+    initial_approach_speed: Rate | dict[str, Rate] | None = None  # type: ignore[assignment]
     """impact rate of contacts that exist at the start, which are refused otherwise, or a table of rates by contact; 0
     for resting ones"""
 

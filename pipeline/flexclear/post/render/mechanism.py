@@ -303,10 +303,10 @@ def _guide(at: Layout, joint: Mapping[str, Any], slider: Sequence[float]) -> Sur
     if "guide_length" in joint:
         low, high = -0.5 * joint["guide_length"], 0.5 * joint["guide_length"]
     thick, plates = 0.1 * height, list[Surface]()
-    for axis, size, gap in ((0, height, joint["clearance"]), (1, width, joint.get("side_clearance"))):
+    for axis, size, gap in ((0, height, joint["clearance"]), (1, width, joint.get("side_clearance", 0.0))):
         across = [width, height][axis] + 2.0 * thick
         box = surfaces.box((thick, across, high - low) if axis == 0 else (across, thick, high - low))
-        for side in (1.0, -1.0) if gap is not None else ():
+        for side in (1.0, -1.0) if gap else ():
             plates.append(surfaces.place(box, np.eye(3)[axis] * side * (0.5 * (size + thick) + gap)))
     return surfaces.place(surfaces.join(plates), np.array([0.0, 0.0, 0.5 * (low + high)]))
 
