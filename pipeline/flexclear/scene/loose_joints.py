@@ -9,7 +9,6 @@ from flexclear.scene.clearance import Friction, Material, NormalLaw, Wear
 from flexclear.scene.fields import FrameName, Length, Part, Positive, Speed
 from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Seat, facing
 
-
 #: approach speed of a contact
 Rate = Annotated[Speed, Field(ge=0.0)]
 
