@@ -25,8 +25,8 @@ from flexclear.dynamics.contact.surfaces import clearance_spherical
 from flexclear.dynamics.drives.pieces import Pieces, pieces_of
 from flexclear.dynamics.model import merge as grouping
 from flexclear.dynamics.model.contacts import LEAST_RATE
-from flexclear.scene.clearance import ClearanceSpherical
 from flexclear.scene.drives import JointDrive
+from flexclear.scene.loose_joints import ClearanceSpherical
 from flexclear.scene.schema import Scene
 
 EPSILON = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])

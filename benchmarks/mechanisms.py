@@ -18,8 +18,8 @@ from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of, observe_run
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
-from flexclear.scene.clearance import ClearanceSpherical
 from flexclear.scene.load import edited, load_scene
+from flexclear.scene.loose_joints import ClearanceSpherical
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
 from flexclear.stages.scenes import bundles, find_scene

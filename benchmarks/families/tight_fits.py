@@ -20,7 +20,7 @@ from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, table
 from flexclear.dynamics.contact.form import FORMS
 from flexclear.dynamics.model.contacts import resolve_law
-from flexclear.scene.clearance import Clearance
+from flexclear.scene.loose_joints import Clearance
 
 RADIUS, LENGTH, MODULUS, POISSON = 10e-3, 10e-3, 207e9, 0.3
 MATERIAL = {"youngs_modulus": MODULUS, "poisson": POISSON}

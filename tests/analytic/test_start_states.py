@@ -12,8 +12,8 @@ from flexclear.dynamics.run.coordinates import joint_coordinates
 from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.starts import ideal, snapshot
 from flexclear.numerics.rotations import quaternion_to_matrix
-from flexclear.scene.clearance import ClearanceRevolute
 from flexclear.scene.load import edited, load_scene
+from flexclear.scene.loose_joints import ClearanceRevolute
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, bundles

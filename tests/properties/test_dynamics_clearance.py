@@ -16,7 +16,7 @@ from flexclear.dynamics.contact import surfaces as surfaces_of_joints
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.numerics.rotations import rotation_vector_to_matrix
-from flexclear.scene.clearance import CONTACTS
+from flexclear.scene.loose_joints import CONTACTS
 from flexclear.scene.parts import Joint
 from flexclear.scene.schema import Scene
 from tests.properties.kernels import from_arrays, from_python

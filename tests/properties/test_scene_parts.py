@@ -9,8 +9,8 @@ import pytest
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
-from flexclear.scene.clearance import ClearanceRevolute
 from flexclear.scene.load import edited, load_scene
+from flexclear.scene.loose_joints import ClearanceRevolute
 from flexclear.scene.quantity import parse
 from flexclear.stages import simulation
 from flexclear.system.errors import InputError

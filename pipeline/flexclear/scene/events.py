@@ -8,12 +8,12 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, TypeAdapter, ValidationError, WithJsonSchema, model_validator
 
-from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.drives import Drive, JointDrive, PathDrive
 from flexclear.scene.event_kinds import CHANGES
 from flexclear.scene.fields import Part, PartName, given_keys, require_one
 from flexclear.scene.formulas import formula
 from flexclear.scene.loads import Load, SampledPid
+from flexclear.scene.loose_joints import CONTACTS
 from flexclear.scene.owners import COORDINATES
 from flexclear.scene.quantity import condition
 from flexclear.scene.registry import suggestion

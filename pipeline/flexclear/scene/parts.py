@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from flexclear.scene.clearance import Clearance, JointFriction, NormalLaw, require_fitting
+from flexclear.scene.clearance import JointFriction, NormalLaw, require_fitting
 from flexclear.scene.fields import (
     AngularVelocity,
     FrameName,
@@ -27,6 +27,7 @@ from flexclear.scene.fields import (
     require_one,
 )
 from flexclear.scene.laws import Value
+from flexclear.scene.loose_joints import Clearance
 from flexclear.scene.segments import FEWEST, MOST
 from flexclear.scene.units import quantity
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from math import inf, pi, sqrt
 from typing import TYPE_CHECKING, Any
 
-from flexclear.scene.clearance import ClearancePrismatic
 from flexclear.scene.drives import JointDrive
 from flexclear.scene.laws import Constant, Harmonic, Piecewise, Repeated, Spline, Step, Sum
 from flexclear.scene.loads import Pid, SampledPid
+from flexclear.scene.loose_joints import ClearancePrismatic
 from flexclear.scene.owners import is_angle
 from flexclear.scene.parts import Ground, RigidBody
 from flexclear.system.errors import InputError

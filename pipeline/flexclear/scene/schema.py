@@ -6,16 +6,17 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from flexclear.scene import provenance
-from flexclear.scene.clearance import CONTACTS, Clearance, Pair
 from flexclear.scene.drives import Drive
 from flexclear.scene.events import Event, require_possible
 from flexclear.scene.fields import Direction, Length, Number, Part, PartName, Positive, Time
 from flexclear.scene.formulas import check_formulas
 from flexclear.scene.limits import Limits, check_members, check_rows
 from flexclear.scene.loads import Gravity, Load, SampledPid
+from flexclear.scene.loose_joints import CONTACTS, Clearance
 from flexclear.scene.notebook import as_html
 from flexclear.scene.output import OF_FLEXIBLE, Output
 from flexclear.scene.owners import owners
+from flexclear.scene.pairs import Pair
 from flexclear.scene.parts import (
     Body,
     FlexibleBody,

@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from flexclear.scene.clearance import SURFACES, Clearance
 from flexclear.scene.load import FAMILIES, SETTINGS, edited
 from flexclear.scene.loads import Bushing
+from flexclear.scene.loose_joints import SURFACES, Clearance
 from flexclear.scene.parts import UNSEEN
 from flexclear.scene.quantity import parse
 from flexclear.scene.registry import suggestion

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from flexclear.scene.clearance import Clearance, Pin
+from flexclear.scene.loose_joints import Clearance, Pin
 
 
 def published(stiffness: Mapping[float, Callable[[Any], float]]) -> Callable[[Clearance, float], float]:

@@ -44,7 +44,7 @@ from flexclear.dynamics.record.wrenches import (
 )
 from flexclear.dynamics.run.run import Run
 from flexclear.numerics.rotations import cross, rotation_vector_to_matrix, skew
-from flexclear.scene.clearance import Clearance, ClearancePrismatic, Pin
+from flexclear.scene.loose_joints import Clearance, ClearancePrismatic, Pin
 from flexclear.scene.parts import RigidBody
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene

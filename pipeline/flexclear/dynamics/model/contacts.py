@@ -22,7 +22,7 @@ from flexclear.dynamics.model.gauges import Gauges
 from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.numbering import Numbering
 from flexclear.dynamics.model.stops import End, ends_an_angle
-from flexclear.scene.clearance import Clearance
+from flexclear.scene.loose_joints import Clearance
 from flexclear.system.errors import InputError, all_or_errors
 
 if TYPE_CHECKING:

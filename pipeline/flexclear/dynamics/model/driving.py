@@ -8,8 +8,8 @@ from typing import Any
 
 from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.drives import PathDrive
+from flexclear.scene.loose_joints import CONTACTS
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError, all_or_errors

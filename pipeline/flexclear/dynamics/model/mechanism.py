@@ -27,8 +27,8 @@ from flexclear.dynamics.model.merge import (
 from flexclear.dynamics.model.start_table import given_modes
 from flexclear.dynamics.model.stops import End, ends
 from flexclear.dynamics.model.tree import PATH, Branch, Edge, edges, span
-from flexclear.scene.clearance import MIDDLE, Pair, Seat
 from flexclear.scene.drives import PathDrive
+from flexclear.scene.pairs import MIDDLE, Pair, Seat
 from flexclear.scene.parts import Ground
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError

@@ -21,9 +21,9 @@ from flexclear.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.dynamics.model.merge import rigid_inertia
 from flexclear.dynamics.model.mobility import moves
 from flexclear.dynamics.model.model import Model, fill_model
-from flexclear.scene.clearance import CONTACTS
 from flexclear.scene.fields import Part
 from flexclear.scene.formulas import formula
+from flexclear.scene.loose_joints import CONTACTS
 from flexclear.scene.schema import Scene
 
 #: keys of a table, or of its parts, that change numbers of a model but neither its links nor its topology

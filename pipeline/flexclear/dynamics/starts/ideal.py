@@ -27,8 +27,8 @@ from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start, per_speed, project
 from flexclear.dynamics.run.run import maker
 from flexclear.dynamics.starts.snapshot import with_held_drives, with_poses_and_velocities, with_resting_contacts
-from flexclear.scene.clearance import Crown, Rim, Seat
 from flexclear.scene.laws import Polynomial
+from flexclear.scene.pairs import Crown, Rim, Seat
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import Start

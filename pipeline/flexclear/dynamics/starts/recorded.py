@@ -67,15 +67,15 @@ def placed(scene: Scene) -> Scene:
     }
     joints, stops = dict[str, Any](scene.joint), dict[str, Any](scene.stop)
     for name in [*scene.contacts(), *scene.stop]:
-        known = {
+        speeds = {
             k.removeprefix(f"contact.{name}").removeprefix("."): max(v[0], 0.0)
             for k, v in row.items()
             if k == f"contact.{name}" or k.startswith(f"contact.{name}.")
         }
-        if known and name in joints:
-            joints[name] = joints[name].begun(known)
-        elif known:
-            stops[name] = stops[name].model_copy(update={"initial_approach_speed": [*known.values()][-1]})
+        if speeds and name in joints:
+            joints[name] = joints[name].begun(speeds)
+        elif speeds:
+            stops[name] = stops[name].model_copy(update={"initial_approach_speed": [*speeds.values()][-1]})
     start = scene.start.model_copy(update={"run": None, "time": None})
     return scene.model_copy(update={"body": bodies, "joint": joints, "stop": stops, "start": start})
 

@@ -14,11 +14,11 @@ from flexclear.dynamics.model.start_table import Given
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.numerics.rotations import matrix_to_quaternion
-from flexclear.scene.clearance import Clearance
 from flexclear.scene.drives import JointDrive
 from flexclear.scene.fields import Pose
 from flexclear.scene.laws import Constant, Polynomial
 from flexclear.scene.loads import JointForce
+from flexclear.scene.loose_joints import Clearance
 from flexclear.scene.parts import Ground, Stop
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import JointStart, ModalStart, Start

@@ -16,7 +16,7 @@ from flexclear.post.answers.effect_sizes import staying_contacts_sentence
 from flexclear.post.answers.stability import ENERGY, lost_energy
 from flexclear.post.overview.curves import impacts, in_unit
 from flexclear.post.single_run.series import horizon_sentence, parameters
-from flexclear.scene.clearance import SURFACES
+from flexclear.scene.loose_joints import SURFACES
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import contacts_that_stay
 

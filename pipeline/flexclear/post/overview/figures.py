@@ -23,7 +23,7 @@ from flexclear.post.overview.curves import (
 )
 from flexclear.post.plotting import style
 from flexclear.post.single_run.series import derive, parameters
-from flexclear.scene.clearance import SURFACES
+from flexclear.scene.loose_joints import SURFACES
 from flexclear.scene.quantity import OF_CONTACTS, Quantity
 
 #: kinds of quantities that other figures show

@@ -17,8 +17,8 @@ import numpy as np
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.post.render import surfaces
 from flexclear.post.render.surfaces import Surface
-from flexclear.scene.clearance import SURFACES
 from flexclear.scene.fields import Pose
+from flexclear.scene.loose_joints import SURFACES
 from flexclear.system.errors import InputError
 from flexclear.system.external_files import read_mesh
 

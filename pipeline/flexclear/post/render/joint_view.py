@@ -11,7 +11,7 @@ from flexclear.post.render import surfaces
 from flexclear.post.render.surfaces import Surface
 from flexclear.post.render.view import View
 from flexclear.post.single_run.series import parameters
-from flexclear.scene.clearance import SURFACES
+from flexclear.scene.loose_joints import SURFACES
 
 #: colour of a path, as in the plots of orbits; largest number of its drawn points
 PATH_COLOR, PLACES = "#009E73", 1500

@@ -33,7 +33,7 @@ from flexclear.post.render.view import View, view
 from flexclear.post.shapes import body_shape
 from flexclear.post.shapes.body_shape import faces, scale_to, surface
 from flexclear.post.single_run.series import parameters
-from flexclear.scene.clearance import SURFACES
+from flexclear.scene.loose_joints import SURFACES
 from flexclear.system.errors import InputError
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
@@ -305,10 +305,10 @@ def _guide(at: Layout, joint: Mapping[str, Any], slider: Sequence[float]) -> Sur
     if "guide_length" in joint:
         low, high = -0.5 * joint["guide_length"], 0.5 * joint["guide_length"]
     thick, plates = 0.1 * height, list[Surface]()
-    for axis, size, gap in ((0, height, joint["clearance"]), (1, width, joint.get("side_clearance"))):
+    for axis, size, gap in ((0, height, joint["clearance"]), (1, width, joint.get("side_clearance", 0.0))):
         across = [width, height][axis] + 2.0 * thick
         box = surfaces.box((thick, across, high - low) if axis == 0 else (across, thick, high - low))
-        for side in (1.0, -1.0) if gap is not None else ():
+        for side in (1.0, -1.0) if gap else ():
             plates.append(surfaces.place(box, np.eye(3)[axis] * side * (0.5 * (size + thick) + gap)))
     return surfaces.place(surfaces.join(plates), np.array([0.0, 0.0, 0.5 * (low + high)]))
 

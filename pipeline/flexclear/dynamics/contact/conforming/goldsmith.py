@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from flexclear.dynamics.contact.conforming.conforming import Conforming, logarithmic, require_journal
 from flexclear.dynamics.contact.hertz import compliance, relative_radius
-from flexclear.scene.clearance import ClearanceRevolute
+from flexclear.scene.loose_joints import ClearanceRevolute
 
 
 def resolve(joint: ClearanceRevolute) -> Conforming:

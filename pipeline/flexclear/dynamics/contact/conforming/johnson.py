@@ -16,7 +16,7 @@ from flexclear.dynamics.contact.conforming.conforming import (
     logarithmic,
     require_journal,
 )
-from flexclear.scene.clearance import ClearanceRevolute
+from flexclear.scene.loose_joints import ClearanceRevolute
 
 
 def resolve(joint: ClearanceRevolute) -> Conforming:

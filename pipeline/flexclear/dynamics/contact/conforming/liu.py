@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import pi
 
 from flexclear.dynamics.contact.conforming.conforming import Conforming, effective_modulus, require_journal
-from flexclear.scene.clearance import ClearanceRevolute
+from flexclear.scene.loose_joints import ClearanceRevolute
 
 
 def resolve(joint: ClearanceRevolute) -> Conforming:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import log
 
 from flexclear.dynamics.contact.conforming.conforming import Conforming, effective_modulus, require_journal
-from flexclear.scene.clearance import ClearanceRevolute
+from flexclear.scene.loose_joints import ClearanceRevolute
 
 #: clearances of the fit [mm], and where its two parts meet
 LEAST, MEETING, LARGEST = 0.005, 0.34954, 10.0

@@ -1,5 +1,5 @@
 """Surfaces of clearance joints. To add one: a module here, a line in the table, its parameters in
-scene/clearance, and a case in tests/properties/test_dynamics_clearance.
+scene/loose_joints, and a case in tests/properties/test_dynamics_clearance.
 
 Each module has the kernel ``separation`` (see `clearance_spherical`), ``stiffness(joint, exponent)`` and
 ``contact_size(joint, depth, force)``.

@@ -10,7 +10,7 @@ import math
 from flexclear.dynamics.contact.hertz import plane_stiffness, published
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import ZERO, axis, dot, scale
-from flexclear.scene.clearance import BallOnPlane
+from flexclear.scene.loose_joints import BallOnPlane
 
 
 @kernel

@@ -1,6 +1,6 @@
 """Pin in a journal with clearance: a circle in a circle, in the plane normal to the journal's axis.
 
-Axial motion and tilt are constrained as by a planar joint (`held` in scene/clearance), with a force along the
+Axial motion and tilt are constrained as by a planar joint (`held` in scene/loose_joints), with a force along the
 axis and moments across it at the pin's frame. The contact (`contact.forces`) acts in the middle of
 the bearing, where the two frames are; over-long bearings, which tilting pins touch at both rims, are
 not modelled.
@@ -18,7 +18,7 @@ from __future__ import annotations
 from flexclear.dynamics.contact import hertz
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import axis, dot, radial, scale, sub
-from flexclear.scene.clearance import ClearanceRevolute
+from flexclear.scene.loose_joints import ClearanceRevolute
 
 
 @kernel

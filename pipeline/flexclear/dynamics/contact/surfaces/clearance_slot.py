@@ -1,7 +1,7 @@
 """Pin in a straight slot with clearance: two walls along x of the slot's frame, and a half circle at each end.
 
 The straight part of the slot's centre line guides the pin's centre. Between its ends the gap is measured across it,
-beyond them from the end. Axial motion and tilt are constrained as by a planar joint (`held` in scene/clearance).
+beyond them from the end. Axial motion and tilt are constrained as by a planar joint (`held` in scene/loose_joints).
 
 The walls are planes; the round ends have the same stiffness. Exponent 1.5: K of a sphere on a plane, as is usual for
 revolute joints (see `clearance_revolute`). Exponent 1: a cylinder on a plane.
@@ -15,7 +15,7 @@ import numpy as np
 from flexclear.dynamics.contact.hertz import cylinder_stiffness, half_width, plane_stiffness, published
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import axis, dot, radial, scale, sub
-from flexclear.scene.clearance import ClearanceSlot
+from flexclear.scene.loose_joints import ClearanceSlot
 
 
 @kernel

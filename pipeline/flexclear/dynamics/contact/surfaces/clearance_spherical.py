@@ -11,7 +11,7 @@ import math
 from flexclear.dynamics.contact.hertz import published, relative_radius, sphere_stiffness
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import radial
-from flexclear.scene.clearance import ClearanceSpherical
+from flexclear.scene.loose_joints import ClearanceSpherical
 
 
 @kernel

@@ -1,0 +1,352 @@
+"""Joints of surfaces in contact: with clearance, in a slot, on a plane; geometry, materials and laws of each."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+
+from pydantic import Field, model_validator
+
+from flexclear.scene.clearance import Friction, Material, NormalLaw, Wear
+from flexclear.scene.fields import FrameName, Length, Part, Positive, Speed
+from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Seat, facing
+
+#: approach speed of a contact
+Rate = Annotated[Speed, Field(ge=0.0)]
+
+
+class _Contact(Part):
+    """Keys of all contacts between surfaces."""
+
+    between: tuple[FrameName, FrameName]
+    """frames of the outer and the inner surface, each as body.FRAME"""
+    normal: NormalLaw
+    """law of the normal force"""
+    friction: Friction | None = None
+    """law of friction; default: no friction"""
+    floor: Annotated[Speed, Positive] | None = None
+    """least impact rate of a closing, for grazing and resting contact; default: 1e-5 of the mechanism's size per
+    second, at most 1e-6 m/s"""
+    initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
+    """impact rate of a contact that exists at the start, which is refused otherwise; 0 for a resting one"""
+
+    #: share of stiffness and damping of the normal law that the contact has
+    share: ClassVar[float] = 1.0
+    #: names of the outer and the inner surface in keys
+    surfaces: ClassVar[tuple[str, str]]
+    #: the ideal joint that constrains the two frames in addition to the contact; None for the contact alone
+    held: ClassVar[str | None] = None
+    #: the ideal joint that connects the two frames without clearance; None where nothing but the contact does
+    ideal: ClassVar[str | None] = None
+    #: whether the outer surface is hollow, and the inner one moves in it
+    hollow: ClassVar[bool] = True
+    #: axes of the outer frame along which `ideal` holds the inner one in the middle
+    across: ClassVar[tuple[int, ...]] = (0, 1, 2)
+    #: axes of the outer frame that show the motion; None for those of the largest motion
+    plane: ClassVar[tuple[int, int] | None] = None
+    #: what of the outer surface the inner one is near to, in words
+    middle: ClassVar[str] = "centre"
+
+    @model_validator(mode="after")
+    def _stiffness_known(self) -> Self:
+        if self.normal.needs_materials and None in self.materials:
+            names = " and ".join(f"{surface}_material" for surface in self.surfaces)
+            raise ValueError(f"the contact stiffness is unknown: give {names}, or normal.stiffness")
+        return self
+
+    @property
+    def radius(self) -> float:
+        """Radius of the inner surface [m]."""
+        return float(getattr(self, f"{self.surfaces[1]}_radius"))
+
+    @property
+    def materials(self) -> tuple[Material | None, Material | None]:
+        """Materials of the outer and the inner surface."""
+        outer, inner = (getattr(self, f"{surface}_material") for surface in self.surfaces)
+        return outer, inner
+
+    @property
+    def arm(self) -> float:
+        """Distance of the surfaces from the middle of the inner one [m]."""
+        return self.radius
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """Further sizes that the kernels of the surfaces need."""
+        return 0.0, 0.0
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """Pairs of features that may touch, by name; an empty name stands for the only pair."""
+        return {"": Pair(self)}
+
+    def begun(self, speeds: Mapping[str, float]) -> Self:
+        """Return the joint with initial approach speeds [m/s] of pairs that touch at the start, by name."""
+        return self.model_copy(update={"initial_approach_speed": speeds.get("", dict(speeds))})
+
+
+class _Clearance(_Contact):
+    """Keys of all clearance joints."""
+
+    clearance: Annotated[Length, Positive]
+    """half the difference of the diameters"""
+
+
+class _Ball(_Contact):
+    """Keys of all contacts of a ball."""
+
+    ball_radius: Annotated[Length, Positive]
+    """radius of the ball"""
+    ball_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+
+class _Worn(_Clearance):
+    """Keys of joints whose wear can be computed."""
+
+    wear: Wear | None = None
+    """wear of both surfaces; default: none"""
+
+
+class Pin(_Clearance):
+    """Keys of all joints of a pin, whose surfaces meet along a line."""
+
+    held: ClassVar[str | None] = "planar"
+    plane = (0, 1)
+    pin_radius: Annotated[Length, Positive]
+    """radius of the pin"""
+    length: Annotated[Length, Positive]
+    """length of the bearing along the axis"""
+    pin_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+
+class ClearanceSpherical(_Ball, _Worn):
+    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
+
+    surfaces, ideal = ("socket", "ball"), "spherical"
+    type: Literal["clearance-spherical"]
+    socket_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+
+class _Several(_Contact):
+    """Keys of joints that may have several contacts."""
+
+    initial_approach_speed: Rate | dict[str, Rate] | None = None  # type: ignore[assignment]
+    """impact rate of contacts that exist at the start, which are refused otherwise, or a table of rates by contact; 0
+    for resting ones"""
+
+    @model_validator(mode="after")
+    def _known_contacts(self) -> Self:
+        given = self.initial_approach_speed
+        unknown = [name for name in given if name not in self.pairs] if isinstance(given, dict) else []
+        if unknown:
+            known = ", ".join(filter(None, self.pairs)) or "none, as the joint is one contact"
+            raise ValueError(f"initial_approach_speed: there is no '{unknown[0]}'; known: {known}")
+        return self
+
+
+class _Tilting(_Several, Pin):
+    """Keys of pins that may tilt in their journal."""
+
+    surfaces = ("journal", "pin")
+    journal_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+    @property
+    def rims(self) -> dict[str, Pair]:
+        """Pairs of the pin and the journal's two ends, ``end_1`` at positive z, each with half of the stiffness."""
+        ends = {f"end_{k}": Seat((0.0, 0.0, side * 0.5 * self.length)) for k, side in ((1, 1.0), (2, -1.0))}
+        return {name: Pair(Rim(self, name, self.clearance), end, end, swapped=True) for name, end in ends.items()}
+
+
+class ClearanceRevolute(_Tilting, _Worn):
+    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame.
+
+    Its axial motion and its tilt are held, unless it has an `axial_clearance`.
+    """
+
+    ideal, across = "revolute", (0, 1)
+    type: Literal["clearance-revolute"]
+    axial_clearance: Annotated[Length, Positive] | None = None
+    """gap between either end of the journal and the pin's collar there; the pin then tilts within its clearance, and
+    nothing is held but by contacts at both ends and the collars"""
+    thrust_radius: Annotated[Length, Positive] | None = None
+    """radius of curvature of the collars' faces; default: the pin's radius"""
+
+    @model_validator(mode="after")
+    def _tilting(self) -> Self:
+        given = next((key for key in ("thrust_radius",) if getattr(self, key) is not None), "")
+        if self.axial_clearance is None and given:
+            raise ValueError(f"{given} is of collars, which need an axial_clearance; give both or neither")
+        if self.axial_clearance is not None and self.wear is not None:
+            raise ValueError("the wear of a pin that tilts is not computed; leave out wear or axial_clearance")
+        return self
+
+    @property
+    def held(self) -> str | None:  # type: ignore[override]
+        """The ideal joint that holds axial motion and tilt."""
+        return "planar" if self.axial_clearance is None else None
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """The pin in its journal; of one that tilts both ends, and the collars ``thrust_1`` at positive z and 2."""
+        gap = self.axial_clearance
+        if gap is None:
+            return super().pairs
+        made = self.rims
+        for k, side in ((1, 1.0), (2, -1.0)):
+            crown = Crown(self, f"thrust_{k}", gap)
+            face = Seat((0.0, 0.0, side * 0.5 * self.length), facing(2, side))
+            made[crown.name] = Pair(crown, face, Seat((0.0, 0.0, side * (0.5 * self.length + gap + crown.radius))))
+        return made
+
+
+class ClearanceCylindrical(_Tilting):
+    """Pin in journal with radial clearance that slides along the axis, z of the journal's frame, and tilts."""
+
+    ideal, held = "cylindrical", None
+    type: Literal["clearance-cylindrical"]
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """The two ends of the journal."""
+        return self.rims
+
+
+class ClearanceSlot(Pin):
+    """Pin in a straight slot with round ends; between = [slot frame, pin frame].
+
+    The slot lies along x of its frame, whose z is the pin's axis; its middle is the frame's origin.
+    """
+
+    surfaces, ideal, across, middle = ("slot", "pin"), "slot", (1,), "centre line"
+    type: Literal["clearance-slot"]
+    clearance: Annotated[Length, Positive]
+    """half the slot's width minus the pin's radius"""
+    travel: Annotated[Length, Positive]
+    """travel of the pin's centre along the slot's middle line, from the centre of one end's half circle to that of the
+    other"""
+    slot_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """Half the length of the straight part [m]."""
+        return 0.5 * self.travel, 0.0
+
+
+class BallOnPlane(_Ball):
+    """Ball above an unbounded plane; between = [plane frame, ball frame].
+
+    The plane contains x and y of its frame; the ball is on the side of z.
+    """
+
+    surfaces, hollow, plane = ("plane", "ball"), False, (0, 2)
+    type: Literal["ball-on-plane"]
+    plane_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+    @property
+    def clearance(self) -> float:
+        """Distance that counts as far [m], since no second wall limits it: the radius."""
+        return self.ball_radius
+
+
+class ClearancePrismatic(_Several, _Clearance):
+    """Rectangular slider in a guide with clearance; between = [guide frame, slider frame], each in the middle.
+
+    It slides along z of the guide's frame. Without `width` it also moves across its height, along x, and turns about y,
+    and the rest is held; with `width` and `side_clearance` nothing is held but by the contacts. Corners of the slider
+    meet the faces of the guide, which are longer than its travel; those of a shorter guide meet the slider's faces.
+    """
+
+    surfaces, ideal, plane = ("guide", "slider"), "prismatic", (0, 2)
+    type: Literal["clearance-prismatic"]
+    clearance: Annotated[Length, Positive]
+    """gap on either side of the slider across its height, when it is in the middle"""
+    length: Annotated[Length, Positive]
+    """length of the slider, along z"""
+    height: Annotated[Length, Positive]
+    """height of the slider, along x"""
+    width: Annotated[Length, Positive] | None = None
+    """width of the slider, along y, when it is loose in this direction as well"""
+    side_clearance: Annotated[Length, Positive] | None = None
+    """gap on either side of the slider across its width"""
+    guide_length: Annotated[Length, Positive] | None = None
+    """length of a guide that is shorter than the slider; default: longer than the slider's travel"""
+    corner_radius: Annotated[Length, Field(ge=0.0)] = 0.0
+    """radius of the corners; default: sharp ones, which need a normal.stiffness"""
+    guide_material: Material | None = None
+    """elastic constants, for the stiffness"""
+    slider_material: Material | None = None
+    """elastic constants, for the stiffness"""
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Self:
+        if (self.width is None) != (self.side_clearance is None):
+            given, absent = ("width", "side_clearance") if self.width is not None else ("side_clearance", "width")
+            raise ValueError(
+                f"{given} is given and {absent} is not: a slider that is loose across its width, too, needs both, "
+                "a plane one neither"
+            )
+        if self.guide_length is not None and not self.guide_length < self.length:
+            raise ValueError(
+                f"guide_length = {self.guide_length:g} m is not below the slider's length, {self.length:g} m: it is of "
+                "a guide whose ends touch the slider's faces; leave it out where the slider's corners touch the guide"
+            )
+        if self.normal.stiffness is None and not self.corner_radius:
+            raise ValueError("the stiffness of sharp corners is unknown: give normal.stiffness, or corner_radius")
+        short = min(filter(None, (self.guide_length or self.length, self.height, self.width)))
+        if not 2.0 * self.corner_radius < short:
+            raise ValueError(
+                f"corner_radius = {self.corner_radius:g} m must be less than half the shortest side, {short:g} m"
+            )
+        return self
+
+    @property
+    def held(self) -> str | None:  # type: ignore[override]
+        """The ideal joint that holds a slider in its plane."""
+        return "guided" if self.width is None else None
+
+    @property
+    def radius(self) -> float:
+        """Radius of the corners [m]."""
+        return self.corner_radius
+
+    @property
+    def arms(self) -> tuple[float, float, float]:
+        """Distances of the corners that stop a turn about z, x and y of the guide [m]."""
+        long = self.guide_length or self.length
+        return self.width or self.height, long, long
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """Pairs of a corner and the face above it: ``corner_1`` to 4 or 8 across the height, ``side_1`` to 8."""
+        short, r = self.guide_length is not None, self.corner_radius
+        ends = 0.5 * (self.guide_length or self.length) - r
+        sizes = (0.5 * self.height, 0.5 * (self.width or 0.0), 0.5 * (self.guide_length or self.length))
+        gaps, made = (self.clearance, self.side_clearance or 0.0, 0.0), dict[str, Pair]()
+        # to the centre of a corner's sphere: of the slider's inwards from its faces, of the guide's outwards
+        inset = tuple(size + gap + r if short else size - r for size, gap in zip(sizes, gaps, strict=True))
+        loose = (0,) if self.width is None else (0, 1)
+        signs = [
+            (x, y, z) for x in (1.0, -1.0) for y in ((0.0,) if self.width is None else (1.0, -1.0)) for z in (1.0, -1.0)
+        ]
+        for axis, prefix in zip(loose, ("corner", "side"), strict=False):
+            for k, (x, y, z) in enumerate(signs, 1):
+                side, name = (x, y)[axis], f"{prefix}_{k}"
+                face = [0.0, 0.0, 0.0]
+                face[axis] = side * (sizes[axis] + (0.0 if short else gaps[axis]))
+                seats = Seat((face[0], face[1], face[2]), facing(axis, side if short else -side))
+                centre = Seat((x * inset[0], y * inset[1], z * ends))
+                made[name] = Pair(Corner(self, name, gaps[axis]), seats, centre, swapped=short)
+        return made
+
+
+Clearance = (
+    ClearanceSpherical | ClearanceRevolute | ClearanceCylindrical | ClearanceSlot | ClearancePrismatic | BallOnPlane
+)
+#: all types of contacts
+CONTACTS: tuple[Any, ...] = get_args(Clearance)
+#: their classes by type
+SURFACES: dict[str, Any] = {name: kind for kind in CONTACTS for name in get_args(kind.model_fields["type"].annotation)}
