@@ -32,7 +32,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     peers = exudyn.points([r for s in log.latest(log.FOLDER / "exudyn.jsonl") for r in s.records])
     for case in cases:
         scene = load_scene(find_scene(case.name))
-        study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY, models=True)
+        study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY)
         studied, pictures = cost.figures_and_tables(case.name, study, "accuracy")
         records: list[Record] = [{"advice": studied.advice}]
         for title, path in studied.pictures.items():
@@ -51,15 +51,15 @@ def show(records: list[Record]) -> str:
         tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r and _shown(r["table"]))
         # the log of former studies has pictures of causes and means as well, which are tables now
         pictures = {r["picture"]: r["path"] for r in mine if r.get("file") == "work_precision.png"}
-        # what to refine is in the table of causes
+        # what to refine was part of former studies
         advice, _, _ = next(r["advice"] for r in mine if "advice" in r).partition(" To refine")
         found.append(Studied(scene, advice, tables, pictures))
     return sections(tuple(found))
 
 
 def _shown(stored: Mapping[str, list]) -> bool:
-    """Return False for costs by quantity, which the pictures show."""
-    return not str(stored["title"]).startswith("What each quantity costs")
+    """Return True for a price list: the log of former studies has other tables as well."""
+    return str(stored["title"]).startswith("What accuracy costs")
 
 
 def _table(stored: Mapping[str, list]) -> Table:
@@ -80,7 +80,7 @@ def files(records: list[Record]) -> dict[str, bytes]:
 
 
 FAMILY = Family(
-    what="error against cost of five scenes, and where the error comes from",
+    what="error against cost of five scenes",
     takes="40 min",
     page="accuracy.md",
     cases=lambda: [Case(scene) for scene in SCENES],

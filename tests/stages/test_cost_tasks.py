@@ -163,7 +163,7 @@ def test_peers_change_the_study_but_none_of_its_points(tmp_path: Path, swing: Sc
 
 def test_integrators_that_are_named_are_compared_and_unknown_ones_refused(csj: Scene):
     groups = {d.group for d in cost_design.wide(csj, ("rk4",))}
-    assert groups == {"step", "paper"}
+    assert groups == {"step"}
     with pytest.raises(InputError, match="did you mean 'radau'"):
         cost_design.wide(csj, ("radua",))
 

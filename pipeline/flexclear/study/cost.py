@@ -17,7 +17,7 @@ from flexclear.dynamics.analyses import require_without_events
 from flexclear.scene.fields import Part
 from flexclear.scene.load import edited
 from flexclear.scene.validation_errors import input_errors
-from flexclear.stages import kernels, scenes, simulation
+from flexclear.stages import kernels, scenes
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace
 from flexclear.study import cost_design, members
@@ -37,25 +37,21 @@ if TYPE_CHECKING:
 Track = dict[str, Any]
 #: largest file of peers [bytes]
 LARGEST_PEERS = 16 << 20
-#: tolerances at which the ensembles of a scene are compared
-ENSEMBLES = (1e-6, 1e-8, 1e-10)
 #: budget of a study [s of processor time]; time of a new set of kernels [s]
 BUDGET, COMPILING = 80.0, 8.0
 #: limit of a point's evaluations: so many times those of the scene's own run, or this fraction of the budget if more
 MOST_EVALUATIONS = 10.0
 #: number of skipped runs that are named
 LISTED_RUNS = 6
-#: tables of a study, in the order in which they are printed
-PRINTED = ("price.md", "causes.md", "statistics.md")
-#: figure of a study, and its title
-FIGURE, TITLE = "work_precision", "Error against cost"
+#: table and figure of a study, and the title of the latter
+TABLE, FIGURE, TITLE = "price.md", "work_precision", "Error against cost"
 
 
 @dataclass
 class Study:
     """A cost study while its points are computed, each from the cache where it exists.
 
-    models: True when other meshes, mode sets and beam theories take part.  compiled: kernels, by what runs on them.
+    compiled: kernels, by what runs on them.
     evaluations: those of runs, by integrator and tolerance; at least so many where they were used up.  own,
     seconds_each: evaluations of the scene's own run, and the time of each.
     """
@@ -64,7 +60,6 @@ class Study:
     workplace: Workplace
     budget: Budget
     integrators: Collection[str] = ()
-    models: bool = False
     peers: Sequence[Track] = ()
     compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
     runs: dict[str, Task] = field(default_factory=dict)
@@ -74,7 +69,6 @@ class Study:
     own: float = 0.0
     seconds_each: float = 0.0
     _complete: bool = False
-    _ensembles: dict[str, Task] = field(default_factory=dict)
 
     def begin(self) -> None:
         """Run the scene as it is, which predicts the time of other runs.
@@ -89,7 +83,7 @@ class Study:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
         same = self._neighbours[0]
         for design in self._neighbours[1:]:
-            if design.scene.solver == same.scene.solver and design.scene.output == same.scene.output:
+            if design.scene.solver == same.scene.solver:
                 self.runs[design.key] = self.runs[same.key]  # one run, which is two points
                 self.points.append(design)
         self.own = float(record.attrs["evaluations"])
@@ -106,12 +100,8 @@ class Study:
 
     def beyond(self) -> None:
         """Compute the points farther away, the cheapest first, as far as the budget goes."""
-        scene, more = self.scene, cost_design.wide(self.scene, self.integrators)
-        if self.models and scene.flexible():
-            bundles = scenes.bundles(scene, self.workplace, jobs=None).values()
-            more += cost_design.models(scene, self.setting, max(float(one["frequency"].max()) for one in bundles))
         known = {design.key for design in (*self.points, *self.undone)}
-        more = [design for design in more if design.key not in known]
+        more = [one for one in cost_design.wide(self.scene, self.integrators) if one.key not in known]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
         self._complete = True
 
@@ -149,35 +139,15 @@ class Study:
                 "undone": _listed([d.key for d in self.undone]),
                 "peers": list(self.peers),
             },
-            inputs=inputs | self._ensembles,
+            inputs=inputs,
             code=("flexclear.post",),
             folder=f"cost/{self.scene.name}",
             names={"nc": "cost.nc"},
         )
 
     def drawn(self) -> Made:
-        """Return the study of the points so far, with its tables and figures."""
+        """Return the study of the points so far, with its table and figure."""
         return self.workplace.made(self.task())[0]
-
-    def ensembles(self) -> None:
-        """Compute the scene's ensemble, if it has one, at several tolerances, as far as the budget goes."""
-        names, ensemble = [q.name for q in self._chosen], self.scene.ensemble
-        for rtol in ENSEMBLES if ensemble is not None else ():
-            change = edited(
-                self.scene, {"solver.rtol": rtol, "solver.integrator": self.scene.solver.integrator, "accuracy": None}
-            )
-            design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
-            if not self.budget.allows(self.own * self.seconds_each * (ensemble.members if ensemble else 1)):
-                self.undone.append(design)
-                continue
-            task = replace(
-                members.point(design, names, self._kernels(design)),
-                stage="cost-ensemble",
-                run="flexclear.stages.cost_point:run_ensemble",
-                params={"simulate": simulation.params(change, ensemble=True), "quantities": names},
-            )
-            self.workplace.datasets(task)
-            self._ensembles[f"ensemble:rtol {rtol:g}"] = task
 
     def _queue(self, designs: Sequence[cost_design.Design], part: float = 1.0) -> None:
         """Compute points in this order; skip those that a part of the budget or the limit of a point does not allow."""
@@ -227,7 +197,7 @@ class Study:
     def _kernels(self, design: cost_design.Design) -> Task:
         shared = kernels.shared(design.scene)
         if shared not in self.compiled:
-            self.compiled[shared] = kernels.task(design.scene, members.bundles(design))
+            self.compiled[shared] = kernels.task(design.scene, Graph(design.scene, shown=False).bodies())
         return self.compiled[shared]
 
 
@@ -238,32 +208,25 @@ def bring(
     integrators: Collection[str] = (),
     *,
     budget: float = BUDGET,
-    models: bool = False,
     answered: Callable[[Made], None] = lambda made: None,
 ) -> Made:
-    """Return the study of a scene with its tables and figures, brought up to date as far as the budget [s] goes.
+    """Return the study of a scene with its table and figure, brought up to date as far as the budget [s] goes.
 
-    peers: runs of other programs.  integrators: see `cost_design.wide`.  models: as of `Study`.  answered: called with
+    peers: runs of other programs.  integrators: see `cost_design.wide`.  answered: called with
     the first answer. Raises InputError for a scene without quantities to measure.  Interrupted work leaves the answer
     so far.
     """
-    study = Study(scene, workplace, Budget(budget), integrators, models, peers)
+    study = Study(scene, workplace, Budget(budget), integrators, peers)
     study.first()
     answered(study.drawn())
     try:
         study.neighbourhood()
         study.beyond()
-        study.ensembles()
     except (KeyboardInterrupt, FlexclearError):
         with suppress(FlexclearError):
             study.drawn()
         raise
     return study.drawn()
-
-
-def tables(made: Made) -> tuple[str, ...]:
-    """Return the existing tables of a study as Markdown."""
-    return tuple(made.text(name) for name in PRINTED if name in made.record.files)
 
 
 def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, dict[str, str]]:
@@ -274,7 +237,7 @@ def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, d
     from flexclear.post.cost.answer import Studied, sentences
 
     path = f"{pictures}/{name.replace('/', '_')}_{FIGURE}.png"
-    return Studied(name, sentences(made.dataset()), tables(made), {TITLE: path}), {path: f"{FIGURE}.png"}
+    return Studied(name, sentences(made.dataset()), (made.text(TABLE),), {TITLE: path}), {path: f"{FIGURE}.png"}
 
 
 def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> None:
