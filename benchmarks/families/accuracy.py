@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
 from flexclear.artifacts.paths import results_root
-from flexclear.post.cost.answer import Studied, sections
+from flexclear.post.cost.answer import sentences
 from flexclear.post.plotting.table import Table, as_markdown, from_markdown
 from flexclear.scene.load import load_scene
 from flexclear.stages.scenes import find_scene, open_workplace
@@ -26,6 +26,26 @@ STUDY = 3600.0
 SCENES = ("sps4/ideal", "sps4/csj", "sps4/far_cb", "sps4/variants/far_csj_cb_damped", "sps4/far_csj_cb")
 
 
+@dataclass(frozen=True, slots=True)
+class Studied:
+    """Section of the page on a scene: `advice`, tables (Markdown), pictures by title."""
+
+    scene: str
+    advice: str
+    tables: tuple[str, ...]
+    pictures: Mapping[str, str]
+
+
+def _sections(scenes: tuple[Studied, ...]) -> str:
+    """Return the advice on each scene, and then each scene's pictures and tables."""
+    parts = ["## What to choose\n", *(f"- **{s.scene}**: {s.advice}\n" for s in scenes)]
+    for s in scenes:
+        parts.append(f"\n## {s.scene}\n")
+        parts += [f"![{title} of {s.scene}]({path})\n" for title, path in s.pictures.items()]
+        parts += [table.rstrip() + "\n" for table in s.tables]
+    return "\n".join(parts)
+
+
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
     """Yield for each scene one record with the advice, one for each picture and one for each table."""
     place = open_workplace()
@@ -33,13 +53,11 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     for case in cases:
         scene = load_scene(find_scene(case.name))
         study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY)
-        studied, pictures = cost.figures_and_tables(case.name, study, "accuracy")
-        records: list[Record] = [{"advice": studied.advice}]
-        for title, path in studied.pictures.items():
-            file = pictures[path]
-            digest = hashlib.sha256(study.read(file)).hexdigest()
-            records.append({"picture": title, "path": path, "file": file, "sha256": digest})
-        yield case, records + [{"table": asdict(from_markdown(text))} for text in studied.tables]
+        file = f"{cost.FIGURE}.png"
+        picture = {"file": file, "sha256": hashlib.sha256(study.read(file)).hexdigest()}
+        picture |= {"picture": "Error against cost", "path": f"accuracy/{case.name.replace('/', '_')}_{file}"}
+        table = asdict(from_markdown(study.text(cost.TABLE)))
+        yield case, [{"advice": sentences(study.dataset())}, picture, {"table": table}]
 
 
 def show(records: list[Record]) -> str:
@@ -54,7 +72,7 @@ def show(records: list[Record]) -> str:
         # what to refine was part of former studies
         advice, _, _ = next(r["advice"] for r in mine if "advice" in r).partition(" To refine")
         found.append(Studied(scene, advice, tables, pictures))
-    return sections(tuple(found))
+    return _sections(tuple(found))
 
 
 def _shown(stored: Mapping[str, list]) -> bool:

@@ -20,7 +20,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the scene's `own`
     setting (own_integrator, own_rtol or own_step), in words what the budget left `undone`, whether the study is
-    `complete`, and `peers`, as in `flexclear.study.cost.read_peers`. The reference is the tightest run among the
+    `complete`, and `peers`, as of `work_precision.peers`. The reference is the tightest run among the
     points; a run by another method confirms it.
     """
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]

@@ -2,49 +2,39 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
-
-from pydantic import Strict, ValidationError, model_validator
+from typing import TYPE_CHECKING, Any
 
 from flexclear.dynamics.analyses import require_without_events
-from flexclear.scene.fields import Part
 from flexclear.scene.load import edited
-from flexclear.scene.validation_errors import input_errors
-from flexclear.stages import kernels, scenes
+from flexclear.stages import kernels
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace
 from flexclear.study import cost_design, members
 from flexclear.study.members import POINT, Budget
-from flexclear.system.errors import FlexclearError, InputError, SolverError
-from flexclear.system.external_files import require_file
+from flexclear.system.errors import FlexclearError, SolverError
 from flexclear.workflow.task import Task
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.post.cost.answer import Studied
     from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
 
-#: a `Peer` as tasks have it in their parameters
+#: runs of another program: name, note, seconds [s] and errors [SI] by quantity, as of `work_precision.peers`
 Track = dict[str, Any]
-#: largest file of peers [bytes]
-LARGEST_PEERS = 16 << 20
 #: budget of a study [s of processor time]; time of a new set of kernels [s]
 BUDGET, COMPILING = 80.0, 8.0
 #: limit of a point's evaluations: so many times those of the scene's own run, or this fraction of the budget if more
 MOST_EVALUATIONS = 10.0
 #: number of skipped runs that are named
 LISTED_RUNS = 6
-#: table and figure of a study, and the title of the latter
-TABLE, FIGURE, TITLE = "price.md", "work_precision", "Error against cost"
+#: table and figure of a study
+TABLE, FIGURE = "price.md", "work_precision"
 
 
 @dataclass
@@ -229,73 +219,7 @@ def bring(
     return study.drawn()
 
 
-def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, dict[str, str]]:
-    """Return the section of a page on a scene, and the study's files of its pictures, by path relative to the page.
-
-    made: as `bring` returned it.  pictures: folder for them next to the page.
-    """
-    from flexclear.post.cost.answer import Studied, sentences
-
-    path = f"{pictures}/{name.replace('/', '_')}_{FIGURE}.png"
-    return Studied(name, sentences(made.dataset()), (made.text(TABLE),), {TITLE: path}), {path: f"{FIGURE}.png"}
-
-
-def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> None:
-    """Write the page on accuracy, with its pictures in a folder of the same name next to it.
-
-    studies: results of `bring`, by scene.  options: the command's other options.
-    """
-    from flexclear.post.cost.answer import markdown
-
-    sections, files = list[Studied](), dict[str, bytes]()
-    for name, made in studies.items():
-        section, pictures = figures_and_tables(name, made, page.stem)
-        sections.append(section)
-        files |= {Path(path).name: made.read(file) for path, file in pictures.items()}
-    scenes.write_page(page, markdown(tuple(sections), f"{page.as_posix()}{options}"), files)
-
-
 def _listed(keys: Sequence[str]) -> str:
     """Return the first keys as text, and the number of the others."""
     more = f" and {len(keys) - LISTED_RUNS} more" if len(keys) > LISTED_RUNS else ""
     return "; ".join(keys[:LISTED_RUNS]) + more
-
-
-class Peer(Part):
-    """Points of another program, measured elsewhere: times [s], and errors [SI] by quantity, a list each."""
-
-    name: str
-    note: str = ""
-    seconds: list[Annotated[float, Strict()]]
-    error: dict[str, list[Annotated[float, Strict()]]]
-
-    @model_validator(mode="after")
-    def _same_length(self) -> Self:
-        if any(len(errors) != len(self.seconds) for errors in self.error.values()):
-            raise ValueError(f"'{self.name}' has {len(self.seconds)} times and a different number of errors")
-        return self
-
-
-def read_peers(path: Path) -> dict[str, list[Track]]:
-    """Read the runs of other programs from a file, by scene.  InputErrors for a file that does not hold such runs."""
-    where = f"--peer {path}"
-    require_file(path, where)
-    try:
-        if path.stat().st_size > LARGEST_PEERS:
-            raise ValueError(f"it is larger than {LARGEST_PEERS >> 20} MB")
-        scenes = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(scenes, dict) or not all(isinstance(tracks, list) for tracks in scenes.values()):
-            raise ValueError("it must be a table of scenes, each with a list of tracks")
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(where, f"cannot be read: {error}", "docs/accuracy/exudyn.json is one") from None
-    return {
-        scene: [_track(f"{where} [{scene}], track {k + 1}", track) for k, track in enumerate(tracks)]
-        for scene, tracks in scenes.items()
-    }
-
-
-def _track(where: str, given: Any) -> Track:
-    try:
-        return Peer.model_validate(given).model_dump(mode="json", exclude_none=True)
-    except ValidationError as error:
-        raise input_errors(where, error, Peer) from None
