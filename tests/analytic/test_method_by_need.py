@@ -368,6 +368,12 @@ def test_a_horizon_that_only_the_loosest_run_has_takes_no_tighter_and_tighter_ru
     assert min(runs) == 1e-6
 
 
+@pytest.mark.parametrize("watched, recorded", [("rod1.position", None), ("rod1.peak_von_mises_stress", ("rod1",))])
+def test_parts_of_runs_record_stresses_only_where_a_quantity_is_one(watched: str, recorded: object) -> None:
+    scene = load_scene(RINGING, {"output.stress": ["rod1"], "view.watch": [watched]})
+    assert scene.with_requested_output().output.stress == recorded
+
+
 @pytest.mark.parametrize("last, expected", [(1.5, 2.0 * 0.1 * 1.5), (4.6, None), (0.1, 2.0 * 0.1 * 0.1)])
 def test_an_error_is_extrapolated_where_it_falls_and_meets_the_request(last: float, expected: float | None) -> None:
     search = Search(load_scene(RIGID, {"accuracy": WANTED}), lambda scene, judges: pytest.fail("no run is needed"))

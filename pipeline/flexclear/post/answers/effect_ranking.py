@@ -21,7 +21,6 @@ from flexclear.artifacts.effect_size import (
     chance,
     change,
     early_changes,
-    scatter,
     size,
 )
 from flexclear.artifacts.points import Point
@@ -108,11 +107,6 @@ def assemble(
         "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be due to chance"}),
         "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
-        "scatter": (
-            ("quantity",),
-            np.array([0.0 if full.refused else scatter(full, q) for q in chosen]),
-            {"long_name": "standard deviation of one run of the scene about the mean of all"},
-        ),
         "members": (("effect",), np.array([pairs[name].members for name in names])),
     }
     coordinates = {
@@ -132,54 +126,31 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
     if IDEAL not in result["effect"].values:
         return []
     one, sentences = result.sel(effect=IDEAL), []
+    until, kinds = float(one["horizon"]), ("early", "dropped")
     for k, name in enumerate(str(q) for q in result["quantity"].values):
-        change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
-        if np.isfinite(change.difference):
-            unit, members = str(result["unit"].values[k]), int(one["members"])
-            scale, until = float(result["size"][k]), float(one["horizon"])
-            text = in_words(change, scale, unit, members, float(result["scatter"][k]))
+        early, whole = (Influence(float(one[kind][k]), float(one[f"{kind}_uncertainty"][k])) for kind in kinds)
+        if np.isfinite(whole.difference):
+            unit, scale = str(result["unit"].values[k]), float(result["size"][k])
+            text = in_words(whole, scale, unit)
             if np.isfinite(until):
-                early = Influence(float(one["early"][k]), float(one["early_uncertainty"][k]))
-                text = f"up to t = {in_unit(until, 's')} {in_words(early, scale, unit)}. Over the whole run it {text}"
+                text = (
+                    f"up to t = {in_unit(until, 's')} it {in_words(early, scale, unit)}; over the whole run it {text}"
+                )
             sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
     return sentences
 
 
-def in_words(
-    change: Influence, scale: float, unit: str, members: int = 0, spread: float = 0.0, of: str = "the scene"
-) -> str:
-    """Return a phrase on the change from the ideal mechanism, whose runs do not scatter, as HTML.
-
-    members: number of runs in the means, 0 for one run each.  spread: standard deviation of a run.  of: owner of the
-    scale.
-    """
-
-    def percent(value: float) -> str:
-        return f" ({format_to_digits(100.0 * value / scale, 2)} % of its {size_of(unit)} in {of})"
-
+def in_words(change: Influence, scale: float, unit: str) -> str:
+    """Return a phrase on the change from the ideal mechanism, as HTML. scale: of the quantity."""
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree within <b class='n'>{in_unit(change.most, unit)}</b>"
-    noticed = change.uncertainty > 1e-3 * change.difference
-    means = f", as means of {members} runs" if members and noticed else ""
-    if noticed and not members:
-        means = f"; the runs themselves err by up to {in_unit(change.uncertainty, unit, 2)}"
-    part = percent(change.difference or change.uncertainty) if change.difference < LARGE * scale else ""
-    up_to = "by up to" if change.difference else "by less than"
-    value = written(change.difference, change.uncertainty if members else 0.0, unit)
-    if not change.difference:
-        value = in_unit(change.uncertainty, unit, 2)
-    amount = f"{up_to} <b class='n'>{value}</b>{part}"
-    if not decided(change, scale) and spread > SLIGHT * scale:
-        apart = f"<b class='n'>{in_unit(spread, unit, 2)}</b>{part and percent(spread)}"
-        return (
-            f"is not predictable: {members} runs from slightly different starts differ by {apart} (standard deviation);"
-            f" their mean differs from the ideal mechanism {amount}; "
-            f"about {round_up(needed(change, scale, members))} runs would decide"
-        )
-    if not decided(change, scale) and members:
-        means += f"; about {round_up(needed(change, scale, members))} runs would decide"
-    slightly = "slightly, " if 0.0 < change.difference < SLIGHT * scale else ""
-    return f"changes {slightly}{amount}{means}"
+    largest = change.difference if change.real else change.most
+    value = written(change.difference, change.uncertainty, unit)
+    part = f" ({format_to_digits(100.0 * largest / scale, 2)} % of its {size_of(unit)})"
+    return (
+        f"changes by {'up to' if change.difference else 'less than'} <b class='n'>{value.removeprefix('< ')}</b>"
+        f"{part if largest < LARGE * scale else ''}"
+    )
 
 
 def needed(change: Influence, scale: float, members: int) -> int:
