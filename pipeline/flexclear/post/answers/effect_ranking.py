@@ -38,10 +38,9 @@ from flexclear.scene.quantity import Quantity
 
 #: effect of clearance and flexibility together: the scene against the ideal mechanism
 IDEAL = "clearance and flexibility"
-#: fraction of a quantity's size below which a change need not be resolved
+#: fraction of a quantity's size below which a change need not be resolved; the answer names effects above it where the
+#: scene requests no accuracy
 SLIGHT = 0.01
-#: accuracies for which the answer names the effects, where the scene requests none
-LEVELS = (0.1, 0.01, 0.001)
 PERCENTAGES = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
 #: number of members from which on Student's t does not change
 MANY = 1000
@@ -162,34 +161,25 @@ def needed(change: Influence, scale: float, members: int) -> int:
 def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     """Return one paragraph on the effects that matter.
 
-    requested: accuracies of the scene by quantity, in SI units; without them three levels are answered.
+    requested: accuracies of the scene by quantity, in SI units; without them the answer is for SLIGHT.
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
     last = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
     last += filter(None, [result.attrs.get("staying", "")])
     if not single.sizes["effect"]:
         return " ".join(last) or "The scene has no effect that can be removed."
-    levels = [(f"errors below {100.0 * level:g} %", level * result["size"].values) for level in LEVELS]
+    name, limits = f"errors below {100.0 * SLIGHT:g} %", SLIGHT * result["size"].values
     if requested:
-        asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
-        levels = [("the requested accuracy", asked)]
-    sentences, named, unchanged = list[str](), list[str](), list[str]()
+        name, limits = (
+            "the requested accuracy",
+            np.array([requested.get(str(q), np.inf) for q in result["quantity"].values]),
+        )
     reached = single["horizon"].values[np.isfinite(single["horizon"].values)]
+    certain, possible = _called_for(single, limits)
+    needs = f"model {listed(certain)}" if certain else "no effect is certain to be needed"
+    needs = needs if certain or possible else "no effect is needed"
     beyond = " beyond the horizon" if reached.size else ""
-    for name, limits in levels:
-        certain, possible = _called_for(single, limits)
-        added = [effect for effect in certain if effect not in named]
-        uncertain = [effect for effect in possible if effect not in certain]
-        open_ = f" (undecided{beyond}: {listed(uncertain)})" if uncertain else ""
-        if added:
-            sentences.append(f"For {name}, {'also ' if named else ''}model {listed(added)}{open_}.")
-        elif uncertain:
-            sentences.append(f"For {name}, no {'further ' if named else ''}effect is certain to be needed{open_}.")
-        else:
-            unchanged.append(name)
-        named += added
-    if unchanged:
-        sentences.append(f"For {listed(unchanged)}, no {'further ' if named else ''}effect is needed.")
+    sentences = [f"For {name}, {needs}{f' (undecided{beyond}: {listed(possible)})' if possible else ''}."]
     sentences += [_parts(single, reached)] if reached.size else []
     sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + last)
