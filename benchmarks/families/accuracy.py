@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
 from flexclear.artifacts.paths import results_root
-from flexclear.post.cost.answer import Studied, advice_sections
+from flexclear.post.cost.answer import sentences
 from flexclear.post.plotting.table import Table, as_markdown, from_markdown
 from flexclear.scene.load import load_scene
 from flexclear.stages.scenes import find_scene, open_workplace
@@ -26,20 +26,38 @@ STUDY = 3600.0
 SCENES = ("sps4/ideal", "sps4/csj", "sps4/far_cb", "sps4/variants/far_csj_cb_damped", "sps4/far_csj_cb")
 
 
+@dataclass(frozen=True, slots=True)
+class Studied:
+    """Section of the page on a scene: `advice`, tables (Markdown), pictures by title."""
+
+    scene: str
+    advice: str
+    tables: tuple[str, ...]
+    pictures: Mapping[str, str]
+
+
+def _sections(scenes: tuple[Studied, ...]) -> str:
+    """Return the advice on each scene, and then each scene's pictures and tables."""
+    parts = ["## What to choose\n", *(f"- **{s.scene}**: {s.advice}\n" for s in scenes)]
+    for s in scenes:
+        parts.append(f"\n## {s.scene}\n")
+        parts += [f"![{title} of {s.scene}]({path})\n" for title, path in s.pictures.items()]
+        parts += [table.rstrip() + "\n" for table in s.tables]
+    return "\n".join(parts)
+
+
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
     """Yield for each scene one record with the advice, one for each picture and one for each table."""
     place = open_workplace()
     peers = exudyn.points([r for s in log.latest(log.FOLDER / "exudyn.jsonl") for r in s.records])
     for case in cases:
         scene = load_scene(find_scene(case.name))
-        study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY, models=True)
-        studied, pictures = cost.figures_and_tables(case.name, study, "accuracy")
-        records: list[Record] = [{"advice": studied.advice}]
-        for title, path in studied.pictures.items():
-            file = pictures[path]
-            digest = hashlib.sha256(study.read(file)).hexdigest()
-            records.append({"picture": title, "path": path, "file": file, "sha256": digest})
-        yield case, records + [{"table": asdict(from_markdown(text))} for text in studied.tables]
+        study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY)
+        file = f"{cost.FIGURE}.png"
+        picture = {"file": file, "sha256": hashlib.sha256(study.read(file)).hexdigest()}
+        picture |= {"picture": "Error against cost", "path": f"accuracy/{case.name.replace('/', '_')}_{file}"}
+        table = asdict(from_markdown(study.text(cost.TABLE)))
+        yield case, [{"advice": sentences(study.dataset())}, picture, {"table": table}]
 
 
 def show(records: list[Record]) -> str:
@@ -51,15 +69,15 @@ def show(records: list[Record]) -> str:
         tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r and _shown(r["table"]))
         # the log of former studies has pictures of causes and means as well, which are tables now
         pictures = {r["picture"]: r["path"] for r in mine if r.get("file") == "work_precision.png"}
-        # what to refine is in the table of causes
+        # what to refine was part of former studies
         advice, _, _ = next(r["advice"] for r in mine if "advice" in r).partition(" To refine")
         found.append(Studied(scene, advice, tables, pictures))
-    return advice_sections(tuple(found))
+    return _sections(tuple(found))
 
 
 def _shown(stored: Mapping[str, list]) -> bool:
-    """Return False for costs, which the advice and the pictures show."""
-    return not str(stored["title"]).startswith(("What accuracy costs", "What each quantity costs"))
+    """Return True for a price list: the log of former studies has other tables as well."""
+    return str(stored["title"]).startswith("What accuracy costs")
 
 
 def _table(stored: Mapping[str, list]) -> Table:
@@ -80,7 +98,7 @@ def files(records: list[Record]) -> dict[str, bytes]:
 
 
 FAMILY = Family(
-    what="error against cost of five scenes, and where the error comes from",
+    what="error against cost of five scenes",
     takes="40 min",
     page="accuracy.md",
     cases=lambda: [Case(scene) for scene in SCENES],

@@ -6,7 +6,6 @@ the whole integration with its samples; they exclude building the model and comp
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -369,7 +368,7 @@ def _run_row(run: Record) -> list[str]:
 
 
 def points(records: list[Record]) -> dict[str, list[dict[str, Any]]]:
-    """Return, by scene of a cost study, runs for `flexclear cost --peer`: seconds [s] and errors [SI] by step."""
+    """Return, by scene of a cost study, runs of `cost.bring`: seconds [s] and errors [SI] by step."""
     versions = {r["case"]: r["version"] for r in records if "version" in r}
     return {
         comparison.study: list(_tracks(runs, f"Exudyn {versions[case]}", comparison.note))
@@ -394,11 +393,8 @@ def _tracks(runs: list[Record], program: str, note: str) -> Iterator[dict[str, A
 
 
 def files(records: list[Record]) -> Mapping[str, bytes]:
-    """Return the JSON file of `points`, and all runs as a table, by path below docs/."""
-    return {
-        "accuracy/exudyn.json": f"{json.dumps(points(records), indent=1)}\n".encode(),
-        "benchmarks/exudyn.csv": as_csv(_listed(_runs(records))).encode(),
-    }
+    """Return all runs as a table, by path below docs/."""
+    return {"benchmarks/exudyn.csv": as_csv(_listed(_runs(records))).encode()}
 
 
 FAMILY = Family(

@@ -20,7 +20,6 @@ from benchmarks.page import Columns, csv_table, mean, table
 from flexclear import dynamics
 from flexclear.dynamics import analyses
 from flexclear.stages import scenes as stages
-from flexclear.stages.workplace import open_workplace
 from flexclear.system.errors import SolverError
 from flexclear.system.progress import silent
 from papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation
@@ -221,7 +220,7 @@ def flexible(layout: Layout, name: str) -> Record:
     """Return means and standard deviations over an ensemble of each member's largest deviations from the ideal one."""
     requested = layouts.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
     ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout), {}, silent)
-    members = analyses.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)
+    members = analyses.ensemble(requested, stages.bundles(requested), silent)
     each = [deviation_row(one) for one in ensemble_deviations(members, ideal, PLATFORM)]
     found = {name: [one[name] for one in each] for name in each[0]}
     found["peak_force"] = members.peak_force.sel(contact=JOINT).values.tolist()

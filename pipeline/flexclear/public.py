@@ -115,14 +115,14 @@ def simulation(scene: AnyScene) -> Simulation:
     return begin(_loaded(scene), open_workplace())
 
 
-def cost(scene: AnyScene, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:
+def cost(scene: AnyScene, budget: str | float | None = None) -> xr.Dataset:
     """Measure what accuracy costs: error against cost over integrators, tolerances and steps; cached point by point.
 
     The quantities are those of the scene's `[accuracy]`, else the watched ones.  budget: processor time of the runs
-    [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets. In a
-    notebook the dataset shows the answer first.  Raises FlexclearError.
+    [s], or text such as "2min"; by default that of ``flexclear cost``.  In a notebook the dataset shows the answer
+    first.  Raises FlexclearError.
     """
-    return answers.dataset("cost", _loaded(scene), budget, models=models)
+    return answers.dataset("cost", _loaded(scene), budget)
 
 
 def stability(scene: AnyScene, budget: str | float | None = None) -> xr.Dataset:

@@ -31,7 +31,6 @@ from flexclear.structure.fe.exchange import files
 from flexclear.structure.fe.recipe import Matrices
 from flexclear.structure.fe.solid import imported
 from flexclear.structure.fe.solid.recipe import MeshFile
-from flexclear.study import cost
 from flexclear.system.errors import FlexclearError, InputError
 from tests.properties.test_scene_words import BASE
 
@@ -248,13 +247,6 @@ def test_a_matrix_that_announces_a_billion_rows_takes_no_memory_for_them(tmp_pat
     shape = Matrices(type="matrices", units="m-kg-s", file="sound.npz", basis="k.mtx")
     with refused("no basis of finite numbers for 6 unknowns"):
         files.read(shape, tmp_path, "recipe")
-
-
-@pytest.mark.parametrize("text", ["[" * 100_000, '{"s": [{"name": 1, "seconds": [NaN], "error": {}}]}', ""])
-def test_runs_of_other_programs_are_numbers(text: str, tmp_path: Path) -> None:
-    (tmp_path / "p.json").write_text(text)
-    with refused("--peer"):
-        cost.read_peers(tmp_path / "p.json")
 
 
 # Folders of results that somebody else sent ----------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,6 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Pieces
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
-from flexclear.study import cost
 from flexclear.system.progress import silent
 from tests.reference import sps4
 from tests.reference.ideal_motion import ideal
@@ -225,13 +223,10 @@ def test_the_peer_s_model_refuses_what_it_would_leave_out():
         solve(Mechanism("chain", growth.four_bars(1), {}), "bar0", next(iter(METHODS)), 1e-3, SAMPLING)
 
 
-def test_the_logged_runs_of_the_peer_are_points_of_cost_studies(tmp_path: Path):
+def test_the_logged_runs_of_the_peer_are_points_of_cost_studies():
     found = exudyn.points(page.records(log.latest(log.FOLDER / "exudyn.jsonl")))
     assert {"sps4/csj", "sps4/variants/far_csj_cb_damped"} <= found.keys()
     for track in found["sps4/csj"]:
         # in SI: some 10 um and some mm/s at the longest step
         assert 1e-8 < track["error"]["platform.position"][0] < 1e-4
         assert 1e-4 < track["error"]["platform.velocity"][0] < 1e-1
-    file = tmp_path / "peers.json"
-    file.write_text(json.dumps(found))
-    assert cost.read_peers(file) == found

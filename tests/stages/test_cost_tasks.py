@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 from typing import Any
@@ -131,29 +130,8 @@ def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Stud
 TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.position": [1e-6, 1e-7]}}
 
 
-@pytest.mark.parametrize(
-    "text, reported",
-    [
-        ("{", "cannot be read"),
-        ("[]", "a table of scenes"),
-        ('{"a": 1}', "a list of tracks"),
-        ('{"a": [{"name": "x"}]}', r"\[a\], track 1 \[seconds\].*is missing"),
-        ('{"a": [{"name": "x", "seconds": ["1"], "error": {}}]}', "expected a number"),
-        ('{"a": [{"name": "x", "seconds": [1], "error": {"q": [1, 2]}}]}', "a different number of errors"),
-    ],
-)
-def test_a_file_of_peers_that_makes_no_sense_is_refused(tmp_path: Path, text: str, reported: str):
-    file = tmp_path / "peers.json"
-    file.write_text(text)
-    with pytest.raises(InputError, match=reported):
-        cost.read_peers(file)
-
-
-def test_peers_change_the_study_but_none_of_its_points(tmp_path: Path, swing: Scene, place: Workplace):
-    file = tmp_path / "peers.json"
-    file.write_text(json.dumps({"checks/pendulum": [TRACK]}))
-    given = ((), cost.read_peers(file)["checks/pendulum"])
-    studies = [cost.Study(swing, place, Budget(1e-3), peers=peers) for peers in given]
+def test_peers_change_the_study_but_none_of_its_points(swing: Scene, place: Workplace):
+    studies = [cost.Study(swing, place, Budget(1e-3), peers=peers) for peers in ((), (TRACK,))]
     for one in studies:
         one.begin()
     plain, other = (one.task() for one in studies)
@@ -163,7 +141,7 @@ def test_peers_change_the_study_but_none_of_its_points(tmp_path: Path, swing: Sc
 
 def test_integrators_that_are_named_are_compared_and_unknown_ones_refused(csj: Scene):
     groups = {d.group for d in cost_design.wide(csj, ("rk4",))}
-    assert groups == {"step", "paper"}
+    assert groups == {"step"}
     with pytest.raises(InputError, match="did you mean 'radau'"):
         cost_design.wide(csj, ("radua",))
 
@@ -217,11 +195,6 @@ def test_members_that_run_at_a_looser_tolerance_err_as_much_more(csj: Scene):
     assert members.integrated(csj, own).looser == pytest.approx(members.MEANS / 1e-9)
     assert members.integrated(csj, own, tight=True).looser == 1.0
     assert members.integrated(csj, Setting("rk4", 1e-10, 1e-5)).looser == 1.0
-
-
-def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, command: Command):
-    page = tmp_path / "nowhere" / "page.md"
-    assert "its folder does not exist" in command("cost", "sps4/csj", "--page", page, code=2).err
 
 
 def test_a_budget_that_is_no_time_is_refused(command: Command):

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import flexclear as fc
 from flexclear.artifacts.effect_size import Influence
 from flexclear.commands.new import write
 from flexclear.dynamics.plan.budget import Chosen, Search
-from flexclear.dynamics.plan.elements import mesh
 from flexclear.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper
 from flexclear.scene import variants
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import uncoupled_paths
 from flexclear.stages import effect_plan
-from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
 from flexclear.study import plan
 from flexclear.system.errors import InputError, SolverError
@@ -36,56 +32,6 @@ pytestmark = pytest.mark.usefixtures("shared_results")
 def _tight(scene: Scene) -> Scene:
     """Without the clearance, which is another matter."""
     return variants.without(scene, [e for e in variants.effects(scene) if e.name.startswith("joint.")])
-
-
-def test_the_recommended_elements_give_the_requested_error(tmp_path: Path):
-    """The estimated error of a frequency on few elements is the true one; as many elements as recommended give the
-    requested error."""
-    leg = load_scene(write("leg", tmp_path)[0])
-
-    def reduced(factor: int) -> xr.Dataset:
-        task = Graph(coarse, shown=False, recipe={"elements": factor}).bundle["rod"]
-        place = open_workplace()
-        return place.store.load(place.bring([task], 1).records[task])
-
-    recipe = tmp_path / "coarse.toml"
-    text = (tmp_path / "leg_rod.toml").read_text()
-    recipe.write_text(re.sub(r"(?m)^elements = .*$", "elements = 2", text))
-    modes = {"reference": "craig-bampton", "count": 8, "interfaces": ["bottom", "top"]}
-    body = leg.body["rod"].model_dump(mode="json", exclude_none=True, exclude={"modes", "mesh", "damping"})
-    coarse = edited(leg, {"body.rod": {**body, "mesh": str(recipe), "modes": modes}})
-    one, two, many = (reduced(factor) for factor in (1, 2, 8))
-    # bending does 1 mm, of which the mesh may err by a tenth of 10 um; in a second the lowest vibration loses its phase
-    found = mesh(2, one, two, {"x": 1e-3}, {"x": 1e-5}, 1.0)
-    exact = many["frequency"].values
-    true = np.abs(one["frequency"].values - exact) / exact
-    # the power by which errors fall is that of fine meshes, and this one is coarse
-    assert found.frequency == pytest.approx(true.max(), rel=0.25)
-    assert found.called_for > found.given
-    factor = -(-found.called_for // 2)
-    left = mesh(2 * factor, reduced(factor), reduced(2 * factor), {"x": 1e-3}, {"x": 1e-5}, 1.0)
-    assert left.error["x"] < 2e-6  # 1e-6 is aimed at, by the power law from a coarse mesh
-    assert mesh(2, one, one, {"x": 1e-3}, {"x": 1e-5}, 1.0).called_for == 1
-
-
-def test_elements_follow_from_the_change_of_the_compliance_alone_where_frequencies_are_exact():
-    """One frame and two modes of unit stiffness: the shapes' squares are the compliance, which the finer mesh changes
-    from 1 to 1/(1 + x) in one of two directions; of order 4, the rest is x/15 of it, and n grows as its fourth root."""
-
-    def reduced(compliance: float) -> Any:
-        shape = np.zeros((1, 3, 2))
-        shape[0, 0, 0], shape[0, 1, 1] = np.sqrt(compliance), 1.0
-        values = {"frequency": np.array([10.0, 20.0]), "frame_translation_shape": shape}
-        values |= {"frame_rotation_shape": np.zeros_like(shape), "modal_stiffness": np.eye(2)}
-        return {name: SimpleNamespace(values=value) for name, value in values.items()}
-
-    change, bending, requested = 0.02, 1e-3, 1e-6
-    found = mesh(4, reduced(1.0 + change), reduced(1.0), {"x": bending}, {"x": requested}, 1.0)
-    assert found.frequency == 0.0
-    assert found.compliance == pytest.approx(change * 16.0 / 15.0, rel=1e-12)
-    assert found.error["x"] == pytest.approx(bending * change * 16.0 / 15.0, rel=1e-12)
-    # a tenth of the requested accuracy is for the mesh
-    assert found.called_for == np.ceil(4.0 * (bending * change * 16.0 / 15.0 / (0.1 * requested)) ** 0.25)
 
 
 def test_fewer_modes_to_choose_from_are_the_static_ones_and_half_of_the_others(tmp_path: Path):
@@ -183,18 +129,10 @@ def test_the_planned_scene_is_a_file_that_runs_and_verifies(tmp_path: Path, comm
 
 def test_bad_plans_are_refused_in_words(tmp_path: Path, command: Command, fresh: Path):
     path = write("pendulum", tmp_path)[0]
-    assert "requests no accuracy" in command("plan", path, "-q", "--jobs", "1", "--verify", code=2).err
     path.write_text(path.read_text() + '\n[accuracy]\nnobody.position = "10 um"\n')
     assert "nobody" in command("plan", path, "-q", "--jobs", "1", code=2).err
     assert "--planned" in command("run", path, "-q", "--verify", code=2).err
     assert not (fresh / "plan").exists()
-
-
-def test_without_a_requested_accuracy_three_levels_are_planned(tmp_path: Path, command: Command):
-    path = write("pendulum", tmp_path)[0]
-    said = command("plan", path, "-q", "--jobs", "1").out
-    assert all(f"| {level}" in said for level in plan.LEVELS)
-    assert said.count("gravity") >= 3  # without it nothing swings
 
 
 def test_the_command_plans_for_an_accuracy_of_its_own(tmp_path: Path, command: Command):
@@ -215,14 +153,13 @@ def test_the_command_ranks_effects_within_a_budget(tmp_path: Path, command: Comm
     assert "chosen by --budget" in command("effects", path, "--budget", "5s", "--members", "4", code=2).err
 
 
-def test_watched_components_that_never_change_are_left_out_of_the_levels(tmp_path: Path, command: Command):
+def test_watched_components_that_never_change_are_left_out(tmp_path: Path, command: Command):
     """A pendulum does not move along its axis; an accuracy of that motion which is named in [accuracy] is refused."""
     path = write("pendulum", tmp_path)[0]
     text = path.read_text()
     path.write_text(text.replace('"rod.position",', '"rod.velocity.z",'))
-    said = command("plan", path, "-q", "--jobs", "1").out
-    assert all(f"| {level}" in said for level in plan.LEVELS)
-    assert said.count("gravity") >= 3
+    said = command("plan", path, "-q", "--jobs", "1").out  # to an accuracy of 1 %
+    assert "gravity" in said
     assert said.count("Left out: rod.velocity.z, which never changes") == 1
     planned, found = fc.plan(load_scene(path), budget=30.0, accuracy="1 %")
     assert list(found["quantity"].values) == ["rod.velocity", "hinge.force"]
@@ -319,12 +256,3 @@ def test_from_python_a_scene_without_a_requested_accuracy_is_planned_for_a_fract
     assert "met" in shown
     shown = both._repr_html_()
     assert shown.index("must be modelled") < shown.index("gravity (gravity)")
-
-
-def test_where_no_accuracy_has_a_plan_the_command_ends_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    def refused(*_: Any) -> None:
-        raise InputError("[accuracy] tip.position", "is a relative accuracy, but the quantity is constant")
-
-    monkeypatch.setattr(plan, "bring", refused)
-    with pytest.raises(InputError, match="the quantity is constant"):
-        plan.levels(load_scene(write("slider-crank", tmp_path)[0]), open_workplace())

@@ -237,23 +237,6 @@ def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: flo
     return float(np.abs(a - b).max(initial=0.0)) if len(a) == len(b) else np.inf
 
 
-def standard_error(ensemble: xr.Dataset, quantity: Quantity) -> float | None:
-    """Return the largest standard error over time of the mean of the members' values, in the quantity's unit.
-
-    None for quantities that ensembles do not record: events, orientations, and components that are not recorded.
-    """
-    kind = KINDS[quantity.kind]
-    if kind.variable not in ensemble or quantity.kind == "orientation" or "time" not in ensemble[kind.variable].dims:
-        return None
-    if quantity.owner not in ensemble[kind.owner].values:
-        return None
-    values = ensemble[kind.variable].sel({kind.owner: quantity.owner}).transpose("member", "time", ...).values
-    if quantity.component:
-        values = values[..., COMPONENTS.index(quantity.component)]
-    spread = np.sqrt(values.var(axis=0, ddof=1).reshape(values.shape[1], -1).sum(axis=1))
-    return float(spread.max() / np.sqrt(len(values)))
-
-
 def scale(run: xr.Dataset, quantity: Quantity) -> float:
     """Return the reference of relative errors: the largest change from the start; for forces the largest value.
 

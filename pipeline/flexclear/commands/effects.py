@@ -56,7 +56,6 @@ def command(options: argparse.Namespace) -> None:
         if budget is not None:
             print(f"{shown_answer('effects', made, graph.scene).text}\n")
         print(made.text(f"{name}.md"))
-        page = {"index.html": "the page"} if budget is None else {}
-        print_files(made.folder, page | {f"{name}.nc": "all effect sizes", f"{name}.png": "the chart"})
+        print_files(made.folder, {f"{name}.nc": "all effect sizes", f"{name}.png": "the chart"})
     if options.json:
         print(as_json(datasets))

@@ -8,7 +8,7 @@ from pathlib import Path
 from flexclear.artifacts.store import publish
 from flexclear.stages import export, scenes
 from flexclear.stages.workplace import open_workplace, seconds
-from flexclear.study.plan import BUDGET, bring, levels, verify
+from flexclear.study.plan import BUDGET, LEVEL, bring, verify
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +21,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--accuracy",
         metavar="FRACTION",
-        help="accuracy of all watched quantities, such as '1 %%' of their sizes, in place of [accuracy]",
+        help="accuracy of all watched quantities, as a fraction of their sizes, in place of [accuracy] "
+        f"(without it {LEVEL.replace('%', '%%')})",
     )
 
 
@@ -32,13 +33,7 @@ def command(options: argparse.Namespace) -> None:
     missed, plans = list[str](), dict[str, object]()
     budget = seconds(options.budget, "--budget")
     for graph in scenes.graphs(options.scenes, options.set):
-        level = options.accuracy
-        if (graph.scene.accuracy or level) is None and not options.verify and options.out is None:
-            plans[graph.scene.name] = table = levels(graph.scene, workplace)
-            if not options.json:
-                print(table)
-            continue
-        planned = bring(graph.scene, workplace, level)
+        planned = bring(graph.scene, workplace, options.accuracy)
         plans[graph.scene.name] = planned.made.dataset() if options.json else None
         if not options.json:
             print(planned.made.text("plan.md"))
@@ -47,7 +42,7 @@ def command(options: argparse.Namespace) -> None:
         if options.verify:
             missed += verify(planned, workplace, budget)
         if not options.json:
-            files = {"index.html": "the page", planned.target.name: "the planned scene", "plan.nc": "all effect sizes"}
+            files = {planned.target.name: "the planned scene", "plan.nc": "all effect sizes", "plan.png": "the chart"}
             scenes.print_files(planned.made.folder, files)
     if options.json:
         print(export.as_json(plans))

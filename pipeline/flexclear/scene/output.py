@@ -146,3 +146,5 @@ axes_velocity? | time loaded_body axis | rad s-1 | angular velocity of the body 
 axes_acceleration? | time loaded_body axis | rad s-2 | angular acceleration of the body frame, body axes
 """),
 }
+#: the names of those variables
+ON_REQUEST = frozenset(name for schema in VARIABLES.values() for name in schema)

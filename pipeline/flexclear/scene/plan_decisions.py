@@ -36,30 +36,14 @@ class Decision:
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """The finite elements of a body. given: their number. called_for: number that the requested accuracy requires.
-
-    frequency, compliance: largest relative errors of the body's mesh, in its retained frequencies and in the compliance
-    of its frames. error: estimated largest error of each quantity due to the mesh [SI].
-    """
-
-    given: int
-    called_for: int
-    frequency: float
-    compliance: float
-    error: Mapping[str, float]
-
-
-@dataclass(frozen=True)
 class Plan:
     """All decisions. requested: accuracy by quantity [SI].
 
     integrator, rtol: of the planned run; empty integrator: as in the scene. modes: elastic coordinates of remaining
     flexible bodies that need fewer than they have. integration: estimated error of the integration by quantity [SI].
     evaluations: of the right-hand side in all runs of the plan. runs: their number. uncoupled: names of parts that
-    nothing couples to the requested quantities. meshes: finite elements of flexible bodies whose recipes give their
-    number. ledger_tolerance: of the planned run, where it differs from the usual one. constant: watched quantities that
-    never change in the ideal mechanism, for which nothing is planned.
+    nothing couples to the requested quantities. ledger_tolerance: of the planned run, where it differs from the usual
+    one. constant: watched quantities that never change in the ideal mechanism, for which nothing is planned.
     """
 
     decisions: tuple[Decision, ...]
@@ -71,7 +55,6 @@ class Plan:
     evaluations: int
     runs: int
     uncoupled: tuple[str, ...] = ()
-    meshes: Mapping[str, Mesh] = field(default_factory=dict)
     ledger_tolerance: float | None = None
     constant: tuple[str, ...] = ()
 

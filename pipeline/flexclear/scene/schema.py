@@ -14,7 +14,7 @@ from flexclear.scene.limits import Limits, check_members, check_rows
 from flexclear.scene.loads import Gravity, Load, SampledPid
 from flexclear.scene.loose_joints import CONTACTS, Clearance
 from flexclear.scene.notebook import as_html
-from flexclear.scene.output import OF_FLEXIBLE, Output
+from flexclear.scene.output import OF_FLEXIBLE, ON_REQUEST, Output
 from flexclear.scene.owners import owners
 from flexclear.scene.pairs import Pair
 from flexclear.scene.parts import (
@@ -28,7 +28,7 @@ from flexclear.scene.parts import (
     RigidBody,
     Stop,
 )
-from flexclear.scene.quantity import Quantity, default_quantities, parse
+from flexclear.scene.quantity import KINDS, Quantity, default_quantities, parse
 from flexclear.scene.solver import NAMING, Solver
 from flexclear.scene.start import Start
 from flexclear.scene.units import any_quantity, quantity, unit_exponents
@@ -332,11 +332,8 @@ class Scene(Part):
 
     def with_requested_output(self) -> Self:
         """Return the scene without stresses and loads of flexible bodies of which no quantity is examined."""
-        asked = {
-            term.owner.partition(".")[0]
-            for q in (*self.requested_quantities(), *self.watched_quantities())
-            for term in q.terms()
-        }
+        terms = (term for q in (*self.requested_quantities(), *self.watched_quantities()) for term in q.terms())
+        asked = {term.owner.partition(".")[0] for term in terms if KINDS[term.kind].variable in ON_REQUEST}
         output = Output.model_validate(self.output.without(self.flexible().keys() - asked))
         return self.model_copy(update={"output": output})
 

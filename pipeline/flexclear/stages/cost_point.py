@@ -14,7 +14,6 @@ import xarray as xr
 from flexclear.artifacts import quantities
 from flexclear.dynamics import analyses, simulate
 from flexclear.scene.quantity import parse
-from flexclear.scene.schema import Scene
 from flexclear.stages.kernels import processor_time, warm
 from flexclear.stages.simulation import bundles, rebuild
 from flexclear.system.errors import SolverError
@@ -50,38 +49,4 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
     costs["recording_seconds"] = float(np.median(recording))
     costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]
-    return {"nc": recorded.assign_attrs(**costs, **_growth(kept), **_contacts(scene))}
-
-
-def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Run an ensemble; return the contacts' statistics and ``standard_error(quantity)`` of the means of the series; or
-    the attribute `refused`.
-
-    params: `simulate`, with the ensemble, and `quantities`. inputs: as in `run`.
-    """
-    scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
-    warm(scene, reduced, progress)
-    try:
-        done = analyses.ensemble(scene, reduced, progress)
-    except SolverError as error:
-        return {"nc": xr.Dataset(attrs={"refused": str(error)})}
-    recorded = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
-    chosen = [parse(name, scene.owners()) for name in params["quantities"]]
-    errors = {q.name: e for q in chosen if (e := quantities.standard_error(done, q)) is not None}
-    recorded = recorded.assign_coords(quantity=list(errors))
-    recorded["standard_error"] = (("quantity",), list(errors.values()))
-    return {"nc": recorded}
-
-
-def _growth(run: xr.Dataset) -> dict[str, float]:
-    """Return the largest separation up to the horizon over the initial perturbation; empty without contacts."""
-    if "separation" not in run:
-        return {}
-    before = run["separation_time"].values <= float(run["horizon"])
-    return {"growth": float(run["separation"].values[before].max()) / float(run.attrs["separation_perturbation"])}
-
-
-def _contacts(scene: Scene) -> dict[str, float]:
-    """Return the largest clearance [m] of a scene with contacts; empty without contacts."""
-    clearances = [joint.clearance for joint in scene.contacts().values()]
-    return {"clearance": max(clearances)} if clearances else {}
+    return {"nc": recorded.assign_attrs(costs)}

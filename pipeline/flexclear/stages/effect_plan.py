@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: inputs ``fewer/<level>/<body>`` are bundles of fewer modes
 FEWER = "fewer/"
-#: inputs ``finer/<body>`` are bundles from twice as many elements
-FINER, TWICE = "finer/", 2
 #: reference condition with static modes, six for each interface but one; reference conditions without static modes
 WITH_STATIC, DIRECTIONS = "craig-bampton", 6
 NORMAL = ("free-free", "fixed-fixed", "cantilever")
@@ -43,10 +41,6 @@ def task(scene: Scene, *, watched: bool = False) -> Task:
     for k, counts in enumerate(levels(scene)):
         with_fewer = Graph(edited(variants.with_modes(scene, counts), {"accuracy": None}), shown=False)
         inputs |= {f"{FEWER}{k}/{body}": with_fewer.bundle[body] for body in counts}
-    counts = elements(scene)
-    if counts:
-        finer = Graph(edited(scene, {"accuracy": None}), shown=False, recipe={"elements": TWICE})
-        inputs |= {f"{FINER}{body}": finer.bundle[body] for body in counts}
     simulate = simulation.params(scene)
     return Task(
         stage="plan",
@@ -55,7 +49,6 @@ def task(scene: Scene, *, watched: bool = False) -> Task:
         params={
             "simulate": simulate,
             "title": scene.title,
-            "elements": counts,
             "units": {q.name: q.unit for q in scene.requested_quantities()},
             "watched": watched,
         },
@@ -65,13 +58,6 @@ def task(scene: Scene, *, watched: bool = False) -> Task:
         folder=f"plan/{scene.name.replace('/', '_')}",
         names={"nc": "plan.nc"},
     )
-
-
-def elements(scene: Scene) -> dict[str, int]:
-    """Return the number of finite elements by flexible body, if a recipe has one and the limits allow twice as many."""
-    counts = {body: read_toml(Path(part.mesh)).get("elements") for body, part in scene.flexible().items()}
-    most = scene.limits.cells // TWICE
-    return {body: n for body, n in counts.items() if isinstance(n, int) and n <= most}
 
 
 def levels(scene: Scene) -> tuple[dict[str, int], ...]:
@@ -133,9 +119,8 @@ def decide_plan(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pro
     bodies = params["simulate"]["scene"]["body"]  # types as in the scene itself, before any body is made rigid
     own = {name: data for name, data in rigid.items() if bodies[name.removeprefix(simulation.RIGID)]["type"] == "rigid"}
     scene = simulation.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
-    meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
     watched = params.get("watched", False)
-    return plan(scene, simulation.bundles(inputs), fewer, meshes, with_rigid_numbers, progress, watched)
+    return plan(scene, simulation.bundles(inputs), fewer, with_rigid_numbers, progress, watched)
 
 
 def fewer_modes(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:

@@ -170,14 +170,13 @@ def _of_another_run(folder: Path) -> bool:
     return post is not None and made is not None and post.facts.get("input run") != made.digest
 
 
-def bundles(scene: Scene, workplace: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
-    """Return the reduced flexible bodies of a scene by name, brought up to date.
+def bundles(scene: Scene, workplace: Workplace | None = None) -> dict[str, xr.Dataset]:
+    """Return the reduced flexible bodies of a scene by name, brought up to date in this process.
 
-    jobs: as of `Workplace.bring`; one is this process, since a worker would run a caller's script again from its top.
     Raises FlexclearError.
     """
     tasks = Graph(scene, shown=False).bundle
-    return dict(zip(tasks, (workplace or open_workplace()).datasets(*tasks.values(), jobs=jobs), strict=True))
+    return dict(zip(tasks, (workplace or open_workplace()).datasets(*tasks.values(), jobs=1), strict=True))
 
 
 def deficits(graph: Graph, workplace: Workplace) -> str:

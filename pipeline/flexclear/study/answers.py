@@ -66,20 +66,17 @@ def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     return ShownAnswer("Which effects matter", text, "effect_ranking.png", caption, table)
 
 
-def dataset(
-    name: str, scene: Scene, budget: str | float | None, *, models: bool = False, of: Sequence[str] = ()
-) -> xr.Dataset:
+def dataset(name: str, scene: Scene, budget: str | float | None, *, of: Sequence[str] = ()) -> xr.Dataset:
     """Return one of the three answers, or the whole study "cost", as a dataset that shows the answer in a notebook.
 
-    budget: processor time [s], or text such as "2min".  models: as in `cost.bring`, for the study.  of: as of
-    `Answers`. Raises as `answer_of`.
+    budget: processor time [s], or text such as "2min".  of: as of `Answers`. Raises as `answer_of`.
     """
     from flexclear.post.answers.answered import with_answer
 
     # in this process: a worker would run a caller's script again from its top
     workplace, given = replace(open_workplace(), jobs=1), None if budget is None else seconds(budget, "budget")
     if name == "cost":
-        name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET, models=models)
+        name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET)
     else:
         answer = answer_of(name, scene, workplace, given, of)
     words = shown_answer(name, answer, scene)

@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 #: what `--ideal` removes: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
 #: files that the page of a comparison shows: pictures with their captions, then tables
-PICTURES = {
-    "compare.png": ("Watched quantities, and their distance from the reference",),
-    "compare_contacts.png": ("Orbits",),
-}
+PICTURES = {"compare.png": ("Watched quantities, and their distance from the reference",)}
 TABLES = ("differences.md", "costs.md")
 
 

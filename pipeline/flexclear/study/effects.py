@@ -9,12 +9,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from flexclear.artifacts.store import publish
-from flexclear.post.pages import Part, page
 from flexclear.scene import variants
 from flexclear.scene.variants import EFFECTS, Effect
 from flexclear.stages import effect_study
-from flexclear.stages.scenes import pictures, tables
 from flexclear.stages.workplace import Made, Workplace
 from flexclear.study.cost_design import Setting
 from flexclear.study.members import MEMBERS, Budget, Members, integrated, setting_of, with_setting
@@ -29,7 +26,7 @@ Names = effect_study.Names
 
 
 def bring(scene: Scene, workplace: Workplace, members: int = MEMBERS[0], of: Sequence[str] = ()) -> Made:
-    """Run all variants; return effect sizes over (effect, other, quantity), and their page.
+    """Run all variants; return effect sizes over (effect, other, quantity).
 
     of: names of effects or parts, as of `variants.effects_of`.  Raises InputError for a scene without effects or
     watched quantities.
@@ -46,15 +43,7 @@ def bring(scene: Scene, workplace: Workplace, members: int = MEMBERS[0], of: Seq
     runs.points(made, members)
     params = {"effects": [[e.name, e.kind, e.within, e.joint] for e in effects], "members": members}
     errors = integrated(scene, setting)
-    (result,) = workplace.made(effect_study.task("effects", scene, chosen, made, runs.tasks, errors, **params))
-    parts = [
-        Part("chart", "Chart", pictures(result, {"effects.png": ("Each effect alone",)})),
-        Part("table", "Table", tables(result, "effects.md")),
-    ]
-    which = "Every effect of the scene" if not of else f"Effects of {', '.join(of)}"
-    lead = f"{which}, removed and added, alone and in pairs."
-    publish(result.folder / "index.html", page(f"Effects: {scene.title}", lead, parts))
-    return result
+    return workplace.made(effect_study.task("effects", scene, chosen, made, runs.tasks, errors, **params))[0]
 
 
 def rank(

@@ -141,15 +141,14 @@ def point(design: Design, names: Sequence[str], compiled: Task, run: Task | None
         part=design.key,
         run="flexclear.stages.cost_point:run",
         params={"simulate": simulation.params(design.scene), "quantities": list(names)},
-        inputs={**bundles(design), "kernels": compiled, **({} if run is None else {"run": run})},
+        inputs={
+            **Graph(design.scene, shown=False).bodies(),
+            "kernels": compiled,
+            **({} if run is None else {"run": run}),
+        },
         code=("flexclear.stages.kernels", *simulation.CODE),
         exclusive=True,
     )
-
-
-def bundles(design: Design) -> dict[str, Task]:
-    """Return the tasks of the bodies of a design's scene."""
-    return Graph(design.scene, shown=False, recipe=design.recipe).bodies()
 
 
 def names_of(scene: Scene, others: Iterable[Quantity] = ()) -> list[str]:
@@ -176,8 +175,8 @@ def tighter(scene: Scene, own: Setting, others: Iterable[Quantity] = ()) -> Task
     design = tighter_design(scene, own)
     if design is None:
         return None
-    first = neighbours(scene, own)[0]  # a study compiles the kernels for this one
-    return point(design, names_of(scene, others), kernels.task(first.scene, bundles(first)))
+    first = neighbours(scene, own)[0].scene  # a study compiles the kernels for this one
+    return point(design, names_of(scene, others), kernels.task(first, Graph(first, shown=False).bodies()))
 
 
 def integrated(scene: Scene, own: Setting, *, tight: bool = False) -> Integrated:

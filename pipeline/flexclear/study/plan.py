@@ -30,29 +30,8 @@ if TYPE_CHECKING:
 SUFFIX = ".planned.toml"
 #: budget of `--verify` [s]
 BUDGET = 60.0
-#: accuracies that are planned for a scene without `[accuracy]`, as fractions of each watched quantity's size
-LEVELS = ("10 %", "1 %", "0.1 %")
-#: that of `fc.plan`
-LEVEL = LEVELS[1]
-
-
-def levels(scene: Scene, workplace: Workplace) -> str:
-    """Return a table of the plans for three accuracies of all watched quantities.
-
-    Raises InputError for a scene without effects or watched quantities, and the last refusal when no accuracy has a
-    plan.
-    """
-    from flexclear.post.answers.plan import levels as shown
-
-    plans: dict[str, xr.Dataset | str] = {}
-    for level in LEVELS:
-        try:
-            plans[level] = bring(scene, workplace, level).made.dataset()
-        except (InputError, SolverError) as error:
-            if not variants.effects(scene) or (level == LEVELS[-1] and all(isinstance(p, str) for p in plans.values())):
-                raise
-            plans[level] = str(error)
-    return as_markdown(shown(plans))
+#: accuracy that is planned for a scene without `[accuracy]`, as a fraction of each watched quantity's size
+LEVEL = "1 %"
 
 
 def with_accuracy(scene: Scene, level: str) -> Scene:
@@ -84,14 +63,14 @@ class Result(NamedTuple):
 def dataset(scene: Scene, level: str | None, budget: str | float | None) -> Result:
     """Return the planned scene, and the plan as a dataset that shows its answer in a notebook.
 
-    level: accuracy of all watched quantities; None for that of the scene, else LEVEL.  budget: time for `errors_of`
+    level: as of `bring`.  budget: time for `errors_of`
     [s], or text; None leaves the errors out.
     """
     from flexclear.post.answers.answered import with_answer
     from flexclear.post.answers.plan import verification_table, words
 
     workplace = open_workplace()
-    planned = bring(scene, workplace, level or (LEVEL if scene.accuracy is None else None))
+    planned = bring(scene, workplace, level)
     result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))
@@ -129,28 +108,17 @@ class Planned:
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
 
 
-def _example(scene: Scene) -> str:
-    """Return an entry that this scene's `[accuracy]` could have."""
-    watched = next((quantity for quantity in scene.watched_quantities() if quantity.kind == "position"), None)
-    body = watched.owner if watched is not None else next(iter(scene.rigid()), "body")
-    return f'{body}.position = "10 um"'
-
-
 def bring(scene: Scene, workplace: Workplace, level: str | None = None) -> Planned:
-    """Bring the plan of a scene up to date, and write the planned scene's file and the page next to it.
+    """Bring the plan of a scene up to date, and write the planned scene's file.
 
-    level: accuracy of all watched quantities that change, in place of the scene's `[accuracy]`, as in `with_accuracy`.
-    Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy no plan or every plan meets, and
-    the errors of its runs.
+    level: accuracy of all watched quantities that change, in place of the scene's `[accuracy]`, as in `with_accuracy`;
+    None for that of the scene, else LEVEL.  Raises InputError for a scene without effects or watched quantities, or
+    whose accuracy no plan or every plan meets, and the errors of its runs.
     """
+    if scene.accuracy is None or not scene.accuracy.quantities:
+        level = level or LEVEL
     scene = scene if level is None else with_accuracy(scene, level)
     where = f"{scene.path or scene.name}"
-    if scene.accuracy is None or not scene.accuracy.quantities:
-        raise InputError(
-            f"{where} [accuracy]",
-            "the scene requests no accuracy",
-            f"request one in [accuracy], such as {_example(scene)}",
-        )
     if not variants.effects(scene):
         raise InputError(
             where, "has no effect that could be omitted: no clearance, flexible body, friction, gravity or stop"
@@ -159,7 +127,6 @@ def bring(scene: Scene, workplace: Workplace, level: str | None = None) -> Plann
     planned = Planned(scene, of(scene, made.dataset()), made)
     if scene.path is not None:
         publish(planned.target, planned.file(planned.target))
-        publish(made.folder / "index.html", page(planned))
     return planned
 
 
@@ -186,24 +153,6 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     )
     result._name, result._path = f"{scene.name}-planned", None
     return result
-
-
-def page(planned: Planned) -> bytes:
-    """Return the page of a plan: its answer in words, the chart, the table, the planned scene."""
-    import html
-
-    from flexclear.post.answers.plan import words
-    from flexclear.post.pages import Part
-    from flexclear.post.pages import page as made
-
-    picture = scenes.pictures(planned.made, {"plan.png": ("Estimated size of each effect, at most",)})
-    text = html.escape(planned.file(planned.target).decode())
-    parts = [
-        Part("chart", "Effect sizes", picture),
-        Part("decisions", "Decisions", scenes.tables(planned.made, "plan.md")),
-        Part("scene", "The planned scene", f"<figure><pre class='scroll'>{text}</pre></figure>"),
-    ]
-    return made(f"Plan: {planned.scene.title}", words(planned.made.dataset()), parts)
 
 
 def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> list[str]:

@@ -133,14 +133,13 @@ def _page(
     answers: Mapping[str, Made],
 ) -> bytes:
     from flexclear.post.answers.effect_ranking import ideal_sentences
-    from flexclear.post.answers.summary import answer, by_weight, effects
+    from flexclear.post.answers.summary import answer, effects
     from flexclear.post.single_run.series import parameters
 
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
     warnings = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
-    assumptions = by_weight(assumed_values(derived_series.sources(scene)), run)
-    members = _members(graph, made)
+    assumptions = assumed_values(derived_series.sources(scene))
     parts: list[Any] = [
         Part("film", "The mechanism in motion", _moving(graph, made)),
         Part("run", "The run", pictures(made.get(graph.overview), FIGURES)),
@@ -149,7 +148,7 @@ def _page(
         Part("doubts", "Warnings", prose(("no.", "warning"), [(f"{k + 1}", text) for k, text in enumerate(warnings)])),
         Part(
             "assumptions",
-            "Assumptions, the most influential first",
+            "Assumptions",
             prose(("value", "assumption"), assumptions.items()),
         ),
         Part(
@@ -159,12 +158,12 @@ def _page(
         ),
         Part("cost", "How it was computed", prose(("quantity", "value"), _rows(attributes, COST).items())),
         Part("provenance", "Provenance", prose(("item", "value"), _provenance(graph, made).items())),
-        Part("downloads", "Downloads", downloads(_files(graph, compared))),
+        Part("downloads", "Downloads", downloads(_files(graph))),
     ]
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
     changes = ideal_sentences(answers["effects"].dataset()) if "effects" in answers else []
-    return page(scene.title, lead, parts, answer(dataset, run, warnings, changes, members))
+    return page(scene.title, lead, parts, answer(dataset, run, warnings, changes))
 
 
 def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
@@ -183,13 +182,6 @@ def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, 
     return rows
 
 
-def _members(graph: Graph, made: Mapping[Task, Made]) -> float | None:
-    """Return the predictability horizon of the scene's ensemble [s]; None without an ensemble, or where it fails."""
-    if graph.ensemble is None or graph.post not in made:
-        return None
-    return float(made[graph.post].dataset()["ensemble_horizon"])
-
-
 def _provenance(graph: Graph, made: Mapping[Task, Made]) -> dict[str, str]:
     rows = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
     run = made.get(graph.simulate)
@@ -198,17 +190,14 @@ def _provenance(graph: Graph, made: Mapping[Task, Made]) -> dict[str, str]:
     return rows | {"sources of methods and data": f"`flexclear cite {graph.scene.name}`"}
 
 
-def _files(graph: Graph, compared: Made | None) -> dict[str, bytes]:
-    """Return the scene's file, its recipes and the tables, by name; small enough for any page."""
+def _files(graph: Graph) -> dict[str, bytes]:
+    """Return the scene's file and its recipes, by name; small enough for any page."""
     files = {}
     if graph.scene.path is not None:
         files[graph.scene.path.name] = graph.scene.path.read_bytes()
     for recipe in graph.scene.recipes().values():
         files[Path(recipe).name] = Path(recipe).read_bytes()
-    tables = compared.record.files if compared is not None else {}
-    return files | {
-        name: compared.read(name) for name in ("differences.csv", "costs.csv") if compared and name in tables
-    }
+    return files
 
 
 def _moving(graph: Graph, made: Mapping[Task, Made]) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 from flexclear.artifacts.paths import PACKAGE
@@ -43,11 +44,12 @@ def references(scene: Scene) -> str:
     return "\n".join(dict.fromkeys(source for path in paths if path.is_file() for source in sources(path)))
 
 
-def sources(path: Path) -> Iterator[str]:
-    """Yield the texts after ``Source:`` in all docstrings of a module, each on one line."""
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
-            yield from cited_sources(ast.get_docstring(node))
+@cache
+def sources(path: Path) -> tuple[str, ...]:
+    """Return the texts after ``Source:`` in all docstrings of a module, each on one line."""
+    nodes = ast.walk(ast.parse(path.read_bytes()))
+    documented = [node for node in nodes if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))]
+    return tuple(source for node in documented for source in cited_sources(ast.get_docstring(node)))
 
 
 def _named(scene: Scene) -> set[str]:

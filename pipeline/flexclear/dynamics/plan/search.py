@@ -21,13 +21,12 @@ from flexclear.artifacts.points import Point
 from flexclear.dynamics.linear.clearance_response import OF_POSE, bounds
 from flexclear.dynamics.linear.response import Response, response
 from flexclear.dynamics.plan.budget import BUDGET, UNCHANGED, WHOLE, Chosen, Search, upper_bounds, widened
-from flexclear.dynamics.plan.elements import mesh
 from flexclear.dynamics.plan.impacts import cheapest, decide_bending
 from flexclear.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, ScreeningRuns
 from flexclear.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper, smooth
 from flexclear.dynamics.run.run import Run, integrate
 from flexclear.scene.load import edited
-from flexclear.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
+from flexclear.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Plan
 from flexclear.scene.quantity import KINDS, OF_CLEARANCE, Quantity, parse
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, uncoupled_paths, without_parts
@@ -51,7 +50,6 @@ def plan(
     scene: Scene,
     bundles: Mapping[str, Labelled],
     fewer: Sequence[Mapping[str, xr.Dataset]],
-    meshes: Mapping[str, tuple[int, xr.Dataset]],
     filled: Callable[[Scene], Scene],
     progress: Progress,
     watched: bool = False,
@@ -59,7 +57,7 @@ def plan(
     """Return the decisions for a scene with `[accuracy]`.
 
     bundles: reduced flexible bodies.  fewer: those with fewer modes, for bodies with a choice, levels with the
-    fewest first.  meshes: numbers of elements, and the bodies reduced from twice as many.  filled: fills a variant
+    fewest first.  filled: fills a variant
     with the rigid bodies that recipes describe.  watched: the quantities are those that the scene watches, not named
     for their accuracy: those that never change are left out.
     Raises InputError where nothing is requested, or the motion is smaller than the request; SolverError where the
@@ -86,7 +84,7 @@ def plan(
     _confirm(search, soft)
     _others(search)
     constant = tuple(q.name for q in quantities if q.name not in search.requested)
-    return replace(_finished(search, effects(scene), uncoupled_parts, meshes), constant=constant)
+    return replace(_finished(search, effects(scene), uncoupled_parts), constant=constant)
 
 
 def _requested(
@@ -337,23 +335,10 @@ def _chosen(search: Search) -> Chosen:
     return smooth(runs, dropped, search.requested, None)
 
 
-def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dict[str, Mesh]:
-    """Return the finite elements that flexible bodies need, judged by the effect of their flexibility."""
-    scene, numbers = search.runs.scene, {}
-    for body, (given, finer) in meshes.items():
-        decision = search.decisions.get(f"body.{body}.modes")
-        if decision is not None and decision.kept:
-            bending = {n: v + decision.uncertainty.get(n, 0.0) for n, v in decision.estimate.items()}
-            duration = scene.time.end - scene.time.start
-            numbers[body] = mesh(given, search.runs.bundles[body], finer, bending, search.requested, duration)
-    return numbers
-
-
 def _finished(
     search: Search,
     every: Sequence[Effect],
     uncoupled_parts: tuple[str, ...],
-    meshes: Mapping[str, tuple[int, xr.Dataset]],
 ) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
     chosen = cheaper_method(search, _chosen(search))
@@ -378,6 +363,5 @@ def _finished(
         runs.evaluations,
         len(runs.points),
         uncoupled_parts,
-        _meshes(search, meshes),
         chosen.ledger_tolerance,
     )

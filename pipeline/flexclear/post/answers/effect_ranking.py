@@ -21,7 +21,6 @@ from flexclear.artifacts.effect_size import (
     chance,
     change,
     early_changes,
-    scatter,
     size,
 )
 from flexclear.artifacts.points import Point
@@ -39,10 +38,9 @@ from flexclear.scene.quantity import Quantity
 
 #: effect of clearance and flexibility together: the scene against the ideal mechanism
 IDEAL = "clearance and flexibility"
-#: fraction of a quantity's size below which a change need not be resolved
+#: fraction of a quantity's size below which a change need not be resolved; the answer names effects above it where the
+#: scene requests no accuracy
 SLIGHT = 0.01
-#: accuracies for which the answer names the effects, where the scene requests none
-LEVELS = (0.1, 0.01, 0.001)
 PERCENTAGES = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
 #: number of members from which on Student's t does not change
 MANY = 1000
@@ -108,11 +106,6 @@ def assemble(
         "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be due to chance"}),
         "decided": (dims, np.array([[is_decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
-        "scatter": (
-            ("quantity",),
-            np.array([0.0 if full.refused else scatter(full, q) for q in chosen]),
-            {"long_name": "standard deviation of one run of the scene about the mean of all"},
-        ),
         "members": (("effect",), np.array([pairs[name].members for name in names])),
     }
     coordinates = {
@@ -132,54 +125,31 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
     if IDEAL not in result["effect"].values:
         return []
     one, sentences = result.sel(effect=IDEAL), []
+    until, kinds = float(one["horizon"]), ("early", "dropped")
     for k, name in enumerate(str(q) for q in result["quantity"].values):
-        change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
-        if np.isfinite(change.difference):
-            unit, members = str(result["unit"].values[k]), int(one["members"])
-            scale, until = float(result["size"][k]), float(one["horizon"])
-            text = in_words(change, scale, unit, members, float(result["scatter"][k]))
+        early, whole = (Influence(float(one[kind][k]), float(one[f"{kind}_uncertainty"][k])) for kind in kinds)
+        if np.isfinite(whole.difference):
+            unit, scale = str(result["unit"].values[k]), float(result["size"][k])
+            text = in_words(whole, scale, unit)
             if np.isfinite(until):
-                early = Influence(float(one["early"][k]), float(one["early_uncertainty"][k]))
-                text = f"up to t = {in_unit(until, 's')} {in_words(early, scale, unit)}. Over the whole run it {text}"
+                text = (
+                    f"up to t = {in_unit(until, 's')} it {in_words(early, scale, unit)}; over the whole run it {text}"
+                )
             sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
     return sentences
 
 
-def in_words(
-    change: Influence, scale: float, unit: str, members: int = 0, spread: float = 0.0, of: str = "the scene"
-) -> str:
-    """Return a phrase on the change from the ideal mechanism, whose runs do not scatter, as HTML.
-
-    members: number of runs in the means, 0 for one run each.  spread: standard deviation of a run.  of: owner of the
-    scale.
-    """
-
-    def percent(value: float) -> str:
-        return f" ({format_to_digits(100.0 * value / scale, 2)} % of its {size_of(unit)} in {of})"
-
+def in_words(change: Influence, scale: float, unit: str) -> str:
+    """Return a phrase on the change from the ideal mechanism, as HTML. scale: of the quantity."""
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree within <b class='n'>{in_unit(change.most, unit)}</b>"
-    noticed = change.uncertainty > 1e-3 * change.difference
-    means = f", as means of {members} runs" if members and noticed else ""
-    if noticed and not members:
-        means = f"; the runs themselves err by up to {in_unit(change.uncertainty, unit, 2)}"
-    part = percent(change.difference or change.uncertainty) if change.difference < LARGE * scale else ""
-    up_to = "by up to" if change.difference else "by less than"
-    value = format_difference(change.difference, change.uncertainty if members else 0.0, unit)
-    if not change.difference:
-        value = in_unit(change.uncertainty, unit, 2)
-    amount = f"{up_to} <b class='n'>{value}</b>{part}"
-    if not is_decided(change, scale) and spread > SLIGHT * scale:
-        apart = f"<b class='n'>{in_unit(spread, unit, 2)}</b>{part and percent(spread)}"
-        return (
-            f"is not predictable: {members} runs from slightly different starts differ by {apart} (standard deviation);"
-            f" their mean differs from the ideal mechanism {amount}; "
-            f"about {round_up(members_to_decide(change, scale, members))} runs would decide"
-        )
-    if not is_decided(change, scale) and members:
-        means += f"; about {round_up(members_to_decide(change, scale, members))} runs would decide"
-    slightly = "slightly, " if 0.0 < change.difference < SLIGHT * scale else ""
-    return f"changes {slightly}{amount}{means}"
+    largest = change.difference if change.real else change.most
+    value = format_difference(change.difference, change.uncertainty, unit)
+    part = f" ({format_to_digits(100.0 * largest / scale, 2)} % of its {size_of(unit)})"
+    return (
+        f"changes by {'up to' if change.difference else 'less than'} <b class='n'>{value.removeprefix('< ')}</b>"
+        f"{part if largest < LARGE * scale else ''}"
+    )
 
 
 def members_to_decide(change: Influence, scale: float, members: int) -> int:
@@ -191,34 +161,25 @@ def members_to_decide(change: Influence, scale: float, members: int) -> int:
 def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     """Return one paragraph on the effects that matter.
 
-    requested: accuracies of the scene by quantity, in SI units; without them three levels are answered.
+    requested: accuracies of the scene by quantity, in SI units; without them the answer is for SLIGHT.
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
     last = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
     last += filter(None, [result.attrs.get("staying", "")])
     if not single.sizes["effect"]:
         return " ".join(last) or "The scene has no effect that can be removed."
-    levels = [(f"errors below {100.0 * level:g} %", level * result["size"].values) for level in LEVELS]
+    name, limits = f"errors below {100.0 * SLIGHT:g} %", SLIGHT * result["size"].values
     if requested:
-        asked = np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
-        levels = [("the requested accuracy", asked)]
-    sentences, named, unchanged = list[str](), list[str](), list[str]()
+        name, limits = (
+            "the requested accuracy",
+            np.array([requested.get(str(q), np.inf) for q in result["quantity"].values]),
+        )
     reached = single["horizon"].values[np.isfinite(single["horizon"].values)]
+    certain, possible = _called_for(single, limits)
+    needs = f"model {join_names(certain)}" if certain else "no effect is certain to be needed"
+    needs = needs if certain or possible else "no effect is needed"
     beyond = " beyond the horizon" if reached.size else ""
-    for name, limits in levels:
-        certain, possible = _called_for(single, limits)
-        added = [effect for effect in certain if effect not in named]
-        uncertain = [effect for effect in possible if effect not in certain]
-        open_ = f" (undecided{beyond}: {join_names(uncertain)})" if uncertain else ""
-        if added:
-            sentences.append(f"For {name}, {'also ' if named else ''}model {join_names(added)}{open_}.")
-        elif uncertain:
-            sentences.append(f"For {name}, no {'further ' if named else ''}effect is certain to be needed{open_}.")
-        else:
-            unchanged.append(name)
-        named += added
-    if unchanged:
-        sentences.append(f"For {join_names(unchanged)}, no {'further ' if named else ''}effect is needed.")
+    sentences = [f"For {name}, {needs}{f' (undecided{beyond}: {join_names(possible)})' if possible else ''}."]
     sentences += [_parts(single, reached)] if reached.size else []
     sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + last)

@@ -25,11 +25,6 @@ evidence | effect | | evidence of the decision
 reason | effect | | the decision in words
 requested | quantity | | requested accuracy
 integration | quantity | | estimated error of the planned run's integration, and of the modes that it leaves out
-elements | body | | finite elements of the body
-elements_called_for | body | | finite elements that the requested accuracy requires
-mesh_frequency_error | body | | largest error of a retained frequency due to the mesh, as a fraction
-mesh_compliance_error | body | | largest error of the frames' compliance due to the mesh, as a fraction
-mesh_error | body quantity | | estimated error of the quantity due to the body's mesh, at most, in the quantity's unit
 """)
 
 
@@ -39,7 +34,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
     differ.
     """
-    names, decisions, meshes = list(plan.requested), plan.decisions, list(plan.meshes.values())
+    names, decisions = list(plan.requested), plan.decisions
     uncertainties = [[d.uncertainty.get(n, 0.0 if n in d.estimate else np.nan) for n in names] for d in decisions]
     planned = {
         "gone": [effect.name for effect in plan.removed_effects],
@@ -57,16 +52,10 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         "reason": _texts(d.reason for d in decisions),
         "requested": np.array(list(plan.requested.values())),
         "integration": np.array([plan.integration.get(name, np.nan) for name in names]),
-        "elements": np.array([m.given for m in meshes], dtype=np.int64),
-        "elements_called_for": np.array([m.called_for for m in meshes], dtype=np.int64),
-        "mesh_frequency_error": np.array([m.frequency for m in meshes], dtype=float),
-        "mesh_compliance_error": np.array([m.compliance for m in meshes], dtype=float),
-        "mesh_error": np.reshape([[m.error[name] for name in names] for m in meshes], (-1, len(names))),
     }
     return xr.Dataset(
         {name: (PLAN[name].dims, value, {"long_name": PLAN[name].long_name}) for name, value in values.items()},
         coords={
-            "body": _texts(plan.meshes),
             "effect": _texts(d.effect.name for d in decisions),
             "words": ("effect", _texts(d.effect.words for d in decisions)),
             "quantity": _texts(names),
@@ -115,7 +104,6 @@ def table(planned: xr.Dataset) -> Table:
     decided = json.loads(planned.attrs["planned"])
     notes = [words(planned)]
     notes += [f"{name} retains {count} of its modes, which suffice." for name, count in decided["modes"].items()]
-    notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
     if decided["uncoupled"]:
         notes.append(
             f"Not integrated, since the requested quantities do not depend on it: {join_names(decided['uncoupled'])}."
@@ -149,27 +137,6 @@ def _integration_sentence(decided: Mapping[str, Any]) -> str:
     if "integrator" not in decided:
         return "No other integrator or tolerance is cheaper and as accurate as requested: the scene's own is used."
     return f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}."
-
-
-def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
-    """Return one or two sentences on whether a body has enough finite elements."""
-    given, called = int(part["elements"]), int(part["elements_called_for"])
-    errors = [
-        f"{name} by at most {format_difference(float(value), 0.0, unit)}"
-        for name, value, unit in zip(part["quantity"].values, part["mesh_error"].values, units, strict=True)
-        if np.isfinite(value)
-    ]
-    frequency, compliance = (100.0 * float(part[f"mesh_{of}_error"]) for of in ("frequency", "compliance"))
-    head = (
-        f"{part['body'].item()} has {given} finite elements; errors: {frequency:.2g} % in a natural frequency, "
-        f"{compliance:.2g} % in compliance"
-    )
-    if not errors:
-        return f"{head}; the effect on the requested quantities cannot be determined."
-    text = f"{head}, which change {join_names(errors)}"
-    if called > given:
-        return f"{text}: the requested accuracy requires {called}."
-    return f"{text}: enough; {called} suffice. Elements cost no time in a run, so the recipe is unchanged."
 
 
 def words(planned: xr.Dataset) -> str:
@@ -235,32 +202,6 @@ def _verdict(planned: xr.Dataset, k: int) -> str:
     if result == UNDECIDED and np.isfinite(enough):
         reasons.append(f"{int(np.ceil(enough))} members would decide")
     return f"{result}: {'; '.join(reasons)}" if reasons else result
-
-
-def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
-    """Tabulate the plan for each accuracy, by the accuracy in words; a string says why a plan is missing."""
-    rows, constant = list[tuple[str, ...]](), dict[str, None]()
-    for level, result in plans.items():
-        if isinstance(result, str):
-            rows.append((level, "–", "–", "–", "–", result.splitlines()[0]))
-            continue
-        text = json.loads(result.attrs["planned"])
-        constant |= dict.fromkeys([*_constant(text), *filter(None, [result.attrs.get("staying")])])
-        needed, unseen, gone = _effects_by_decision(result)
-        modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
-        method = f"{text['integrator']}, rtol {text['rtol']:.0e}" if "integrator" in text else "as the scene"
-        rows.append((level, *(join_names(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
-    return Table(
-        "Effects that each accuracy requires",
-        ("accuracy", "needed", "unexamined", "may be omitted", "modes", "integrated by"),
-        tuple(rows),
-        (
-            "Each accuracy is that of all watched quantities, of positions and angles a fraction of the largest change "
-            "from the start, of others of the largest value; name one in [accuracy] to get its planned scene. "
-            "Unexamined: omitting the effect would save less time than the runs that measure its size.",
-            *constant,
-        ),
-    )
 
 
 def _effects_by_decision(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:

@@ -13,9 +13,8 @@ from flexclear.artifacts import quantities
 from flexclear.artifacts.effect_size import Influence
 from flexclear.post.answers.effect_ranking import in_words
 from flexclear.post.answers.effect_sizes import staying_contacts_sentence
-from flexclear.post.answers.stability import ENERGY, lost_energy
 from flexclear.post.overview.curves import impacts, in_unit
-from flexclear.post.single_run.series import horizon_sentence, parameters
+from flexclear.post.single_run.series import parameters
 from flexclear.scene.loose_joints import SURFACES
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import contacts_that_stay
@@ -28,20 +27,19 @@ def answer(
     run: xr.Dataset | None,
     warnings: Sequence[str],
     changes: Sequence[str] = (),
-    members: float | None = None,
 ) -> str:
     """Return a list of sentences, as HTML.
 
     compared: of `overview.comparison`, the ideal counterpart first and the scene last; or None. run: schema RUN of the
     scene.  warnings: of the run.  changes: sentences of `post.answers.effect_ranking` on the differences from the ideal
-    mechanism; they replace those from two runs alone.  members: horizon of the scene's ensemble [s], or None.
+    mechanism; they replace those from two runs alone.
     """
     sentences = [] if compared is None else [*changes] or _effects(compared)
     if compared is None and run is not None:
         lacks = "Balls on planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
         sentences.append(f"{lacks}, so there is no idealised run to compare it with.")
     if run is not None:
-        sentences += [*_impacts(run), *_horizon_lines(run, members), *_trust_lines(run)]
+        sentences += _impacts(run)
     if warnings:
         many = "one warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
         sentences.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
@@ -49,7 +47,7 @@ def answer(
     keeps = (
         [] if run is None else contacts_that_stay({n: j["type"] for n, j in parameters(run).get("joint", {}).items()})
     )
-    head += "; after ±, what may be due to chance" if any("±" in text for text in changes) else ""
+    head += "; after ±, what may be due to chance or to time steps" if any("±" in text for text in sentences) else ""
     head += f" ({html.escape(staying_contacts_sentence(keeps)).rstrip('.')}):" if keeps else ":"
     return f"{'' if compared is None else f'<p>{head}</p>'}<ul>{''.join(f'<li>{text}</li>' for text in sentences)}</ul>"
 
@@ -64,7 +62,7 @@ def _effects(compared: xr.Dataset) -> list[str]:
             text = f"differs by <b class='n'>{in_unit(difference, unit)}</b>; its error is unknown"
             if np.isfinite(error):
                 size = float(first["largest"][j])
-                text = in_words(Influence(difference, error), size, unit, of="the ideal mechanism")
+                text = in_words(Influence(difference, error), size, unit)
             sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
     return sentences
 
@@ -81,26 +79,6 @@ def _impacts(run: xr.Dataset) -> list[str]:
             f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{in_unit(float(peak[0]), unit)}</b>."
         )
     return sentences
-
-
-def _horizon_lines(run: xr.Dataset, members: float | None) -> list[str]:
-    if "horizon" not in run:
-        return []
-    end, horizon = float(run["time"].values[-1]), float(run["horizon"])
-    later = (
-        " Later values hold for this run only; use averages over several runs (<code>[ensemble]</code>)."
-        if min(horizon, end if members is None else members) < end
-        else ""
-    )
-    return [html.escape(horizon_sentence(horizon, end, members)) + later]
-
-
-def _trust_lines(run: xr.Dataset) -> list[str]:
-    fraction = float(lost_energy(run).max())
-    word = "<span class='good'>closes</span>" if fraction < ENERGY else "<span class='bad'>does not close</span>"
-    return [
-        f"The energy balance {word}: <span class='n'>{fraction:.1e}</span> of the largest energy is unaccounted for."
-    ]
 
 
 def effects(scene: Mapping[str, Any]) -> dict[str, str]:
@@ -128,22 +106,3 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
         "gears": list(scene.get("gear", {})),
     }
     return {name: ", ".join(listed) if listed else "not in the scene" for name, listed in present.items()}
-
-
-def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:
-    """Sort assumptions by influence: those on joints with clearance and flexible bodies come first."""
-    scene = {} if run is None else parameters(run)
-    loose = {n for n, j in scene.get("joint", {}).items() if j["type"] in SURFACES}
-    flexible = {n for n, b in scene.get("body", {}).items() if b["type"] == "flexible"}
-
-    def weight(path: str) -> int:
-        family, _, rest = path.partition(".")
-        part = rest.partition(".")[0]
-        if (family, part in loose) == ("joint", True):
-            return 0
-        if (family, part in flexible) == ("body", True):
-            return 1
-        order = {"drive": 2, "load": 3, "stop": 3, "gear": 3, "start": 4, "joint": 5, "body": 6}
-        return order.get(family, 7)
-
-    return dict(sorted(assumptions.items(), key=lambda item: (weight(item[0]), item[0])))

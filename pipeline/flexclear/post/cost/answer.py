@@ -1,14 +1,13 @@
-"""Cost of accuracy in words: a paragraph on one scene, and a page with advice on several scenes."""
+"""Cost of accuracy in words: a paragraph and a price list of a scene."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from flexclear.post.cost.study import is_resolved, methods, recording
+from flexclear.post.cost.study import methods
 from flexclear.post.overview.curves import size_of
 from flexclear.post.plotting.table import Table
 
@@ -56,50 +55,7 @@ def skipped_sentence(study: xr.Dataset) -> list[str]:
     return [f"Not run within the budget: {study.attrs['undone']}."] if study.attrs.get("undone") else []
 
 
-INTRODUCTION = """# What accuracy costs
-
-Made from the datasets `results/cost/<scene>/cost.nc` by
-
-    flexclear cost {scenes} \\
-        --page {page}
-
-Nothing on this page is typed in. Errors are the largest differences from a reference
-run over the whole run, or up to the horizon beyond which the motion of the scene cannot be predicted point by point;
-each is a fraction of the quantity's own size. Times are processor seconds of the integration of warm runs,
-without their record, on one core of the machine that made the page: their ratios carry over to others, their values do
-not.
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class Studied:
-    """Section of the page on a scene: `advice` (`sentences`), tables (Markdown), pictures by title."""
-
-    scene: str
-    advice: str
-    tables: tuple[str, ...]
-    pictures: Mapping[str, str]
-
-
-def markdown(scenes: tuple[Studied, ...], page: str) -> str:
-    """Return the whole page."""
-    names = " ".join(s.scene for s in scenes)
-    return "\n".join([INTRODUCTION.format(scenes=names, page=page), advice_sections(scenes)])
-
-
-def advice_sections(scenes: tuple[Studied, ...]) -> str:
-    """Return the advice on each scene, and then each scene's pictures and tables."""
-    parts = ["## What to choose\n", *(f"- **{s.scene}**: {s.advice}\n" for s in scenes)]
-    for s in scenes:
-        parts.append(f"\n## {s.scene}\n")
-        parts += [f"![{title} of {s.scene}]({path})\n" for title, path in s.pictures.items()]
-        parts += [table.rstrip() + "\n" for table in s.tables]
-    return "\n".join(parts)
-
-
 TARGETS = (1e-3, 1e-6, 1e-9)
-#: a best error within this multiple of the reference's uncertainty, which it contains, is rounding
-ROUNDED = 3.0
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
 
 
@@ -176,29 +132,12 @@ def choices(study: xr.Dataset) -> list[Choice]:
 
 
 def _notes(study: xr.Dataset) -> list[str]:
-    recorded = recording(study)
+    names = ", ".join(str(q) for q in study["quantity"].values)
     notes = [
-        "The error is the largest of all quantities: "
-        + ", ".join(str(q) for q in study["quantity"].values)
-        + "; each as a fraction of its own size (of positions and angles the largest change from the start, of others "
-        "the largest value), the reference's uncertainty included.",
+        f"The error is the largest of all quantities: {names}; each as a fraction of its own size (of positions and "
+        "angles the largest change from the start, of others the largest value), the reference's uncertainty included.",
         _confirmation_sentence(study),
     ]
-    if recorded == recorded:
-        notes.append(
-            f"CPU is that of the integration; the record of a run takes {recorded:.2g} s more with every integrator."
-        )
-    missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
-    if missing:
-        notes.append(f"{' and '.join(missing)} {_absent(study)}: {_why_not(study)}.")
-    hidden = sum(
-        int((~is_resolved(one, g) & np.isfinite(one[f"error_by_{g}"])).sum()) for g, _, _, one in methods(study)
-    )
-    if hidden:
-        notes.append(
-            f"{hidden} errors are less than 10 times the reference's own uncertainty and are not drawn; "
-            "the figure shows that bound."
-        )
     if study.attrs["horizon"] != "none":
         notes.append(f"Pointwise errors count up to the predictability horizon, t = {study.attrs['horizon']:.4g} s.")
     if study.attrs["refused"]:
@@ -209,27 +148,8 @@ def _notes(study: xr.Dataset) -> list[str]:
 def _confirmation_sentence(study: xr.Dataset) -> str:
     uncertain, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
     reference = f"Reference: {study.attrs['reference']}. "
-    if not by:
-        return f"{reference}Not confirmed: there is no second run."
-    if np.isnan(uncertain).any():
-        return f"{reference}Not confirmed: {by} was refused."
-    if np.isinf(uncertain).any():
-        return f"{reference}Not confirmed: {by} has another number of impacts."
+    if not np.isfinite(uncertain).all():
+        why = "was refused" if np.isnan(uncertain).any() else "has another number of impacts"
+        return f"{reference}Not confirmed: {f'{by} {why}' if by else 'there is no second run'}."
     worst = str(study["quantity"].values[int(np.argmax(uncertain))])
     return f"{reference}Confirmed by {by}, which differs by at most {uncertain.max():.1e} ({worst})."
-
-
-def _why_not(study: xr.Dataset) -> str:
-    """Return why an accuracy cannot be had: the tried settings end too early, or rounding decides."""
-    uncertain = study["reference_uncertainty"].fillna(0.0)
-    best = min(choices(study), key=lambda c: c.error, default=NOTHING)
-    if np.isinf(uncertain).any():
-        return "the reference and its confirmation do not agree on the number of impacts"
-    if best is NOTHING:
-        return "every run is refused, or has another number of impacts than the reference"
-    if best.error <= ROUNDED * float(uncertain.sel(quantity=best.worst)):
-        agree = f"the reference and its confirmation, the tightest runs, differ as much ({best.worst})"
-        if not study.attrs.get("complete", 1):
-            return f"{agree}; a larger budget allows tighter ones"
-        return f"{agree}; rounding errors, which the motion magnifies, limit the accuracy of every method"
-    return f"the best setting tested reaches {best.error:.1e} ({best.worst})"

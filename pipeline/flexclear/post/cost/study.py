@@ -1,7 +1,7 @@
 """Dataset of a cost study: error and cost over the factors, and uncertainty of the reference.
 
-Errors are pointwise up to the horizon of the scene's run; beyond it only statistics mean anything
-(`post.cost.statistics`). They are relative to the size of each quantity (`quantities.scale`).
+Errors are pointwise up to the horizon of the scene's run; beyond it only statistics mean anything.
+They are relative to the size of each quantity (`quantities.scale`).
 """
 
 from __future__ import annotations
@@ -24,11 +24,7 @@ from flexclear.system.errors import SolverError, of_trial
 GROUPS: dict[str, tuple[str, ...]] = {
     "tolerance": ("adaptive_integrator", "rtol"),
     "step": ("fixed_integrator", "step"),
-    "model": ("theory", "mode_set", "modes", "elements"),
-    "sampling": ("interval",),
 }
-#: groups of methods and tolerances or steps
-INTEGRATION = ("tolerance", "step")
 #: the reference must agree with its independent confirmation this many times better than an error it measures
 MARGIN = 10.0
 #: costs of a run
@@ -50,7 +46,7 @@ own_error | | 1 | error of the scene's own run, the reference's uncertainty incl
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One run of a study. group: of GROUPS, or 'reference' or 'confirmation'; factors: their values."""
+    """One run of a study. group: of GROUPS, or 'own', 'reference' or 'confirmation'; factors: their values."""
 
     key: str
     group: str
@@ -139,8 +135,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
 
 def methods(study: xr.Dataset) -> Iterator[tuple[str, str, str, xr.Dataset]]:
     """Yield group, integrator, name of its setting, and the study of that integrator alone, for each integrator."""
-    for group in INTEGRATION:
-        method, setting = GROUPS[group]
+    for group, (method, setting) in GROUPS.items():
         for name in study[method].values if f"error_by_{group}" in study else ():
             yield group, str(name), setting, study.sel({method: name})
 
@@ -183,7 +178,7 @@ def cost(run: xr.Dataset, name: str) -> float:
 
 def recording(study: xr.Dataset) -> float:
     """Return processor time of the record of one run [s]: the same for each integration's rows, so one median."""
-    times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in INTEGRATION
+    times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in GROUPS
              if f"recording_seconds_by_{group}" in study]  # fmt: skip
     values = np.concatenate([*times, [np.nan]])
     return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")

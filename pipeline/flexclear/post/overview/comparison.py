@@ -17,10 +17,9 @@ import xarray as xr
 from flexclear.artifacts import quantities
 from flexclear.artifacts.schema import require_complete
 from flexclear.post.overview.curves import NOISE, Curve, curves, in_unit, readable_unit
-from flexclear.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.post.plotting import style
 from flexclear.post.plotting.table import Table
-from flexclear.post.single_run.series import derive, horizon_sentence, parameters
+from flexclear.post.single_run.series import horizon_sentence, parameters
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import InputError
 
@@ -244,8 +243,7 @@ def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) 
             axes[0, 0].plot([], [], ".", color=style.INK, label="peak of a contact shorter than the outputs show")
         style.shared_legend(figure, axes[0, 0], min(len(runs), 3), pale)
         style.heading(figure, "Runs side by side", f"right: distance from {next(iter(runs))}")
-        files = style.files(name, figure)
-        return files | _orbits(f"{name}_contacts", runs)
+        return style.files(name, figure)
 
 
 def _panels(runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[tuple[Quantity, list[Curve | None]]]:
@@ -311,24 +309,6 @@ def _distance(
     style.flatten(axes)
     axes.set_ylim(bottom=0.0)
     axes.set_title(f"from the reference ({written})")
-
-
-def _orbits(name: str, runs: Mapping[str, xr.Dataset]) -> dict[str, bytes]:
-    orbits = [
-        (label, run, k)
-        for label, run in runs.items()
-        if "contact" in run.sizes
-        for k in range(min(run.sizes["contact"], CONTACTS))
-        if str(run["contact"].values[k]) in parameters(run).get("joint", {})  # ends of stops have no orbit
-    ]
-    if not orbits:
-        return {}
-    columns = min(len(orbits), 4)
-    figure, panels = style.panels(len(orbits), columns, max(4.0, 2.75 * columns), 0.6, 3.0)
-    for panel, (label, run, k) in zip(panels, orbits, strict=True):
-        orbit(panel, run, float(derive(run)["clearance"].values[k]), k)
-        panel.set_title(f"{run['contact'].values[k]}: {label}\n{centre(run, k)}")
-    return style.files(name, figure)
 
 
 def _horizon(run: xr.Dataset) -> float:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
@@ -155,7 +156,7 @@ class Search:
 
         attempts: by tolerance, the loosest first. Return None where these are no neighbours, or errors fall too little.
         """
-        if len(attempts) < 2 or rtol in self.wholes:
+        if len(attempts) < 2:
             return None
         before, last = attempts[-2:]
         if (self.next_rung(before.rtol), self.next_rung(last.rtol)) != (last.rtol, rtol):
@@ -164,6 +165,14 @@ class Search:
         factor = DOUBT * max(fall, self.ratio)
         expected = Attempt(rtol, {name: factor * e for name, e in last.errors.items()}, factor * last.fraction)
         return expected if fall < STUCK and expected.met else None
+
+    def again(self, attempts: Sequence[Attempt], until: float) -> list[Attempt]:
+        """Return attempts compared up to a later time [s], without those whose runs are refused before it."""
+        later = list[Attempt]()
+        for one in attempts:
+            with suppress(SolverError):
+                later.append(self.rung(one.rtol, until))
+        return later
 
     @property
     def sizes(self) -> xr.Dataset:
@@ -242,18 +251,23 @@ def by_default(
 def _climb(search: Search, progress: Progress) -> Attempt:
     """Return the loosest tolerance of the ladder that meets the request, else the one with the least error.
 
-    Up to their horizons, runs are compared up to that of the run at the loosest tolerance, unless the delivered run has
-    a later one. A run that is refused, as where its energy ledger does not close, is left out.
+    Up to their horizons, runs are compared up to that of the run at the loosest tolerance. Another horizon replaces it,
+    and the last runs are compared once more, where the delivered run has a later one, and where errors do not fall:
+    then the loosest run seemed predictable for too long. A run that is refused, as where its energy ledger does not
+    close, is left out.
     """
     tightest = TIGHTEST_RUNG if search.predictable else TIGHTEST_TOLERANCE
     rtol, until, nearest, refusal = search.loosest, -math.inf, list[Attempt](), SolverError("")
     while rtol > tightest:
         try:
-            if until < 0.0 or rtol in search.wholes:
-                until = max(until, _horizon(search, rtol))
+            until = _horizon(search, rtol) if until < 0.0 else until
             now = search.extrapolated(rtol, nearest) or search.rung(rtol, until)
-            if now.met and _horizon(search, rtol) > until:
-                continue  # compare up to its own horizon
+            stuck = bool(nearest) and not now.fraction < STUCK * nearest[-1].fraction
+            if now.met or stuck:
+                own = _horizon(search, rtol)
+                if own > until if now.met else own < until:
+                    until, nearest = own, search.again(nearest[-2:], own)
+                    continue
         except SolverError as error:
             refusal, rtol = error, search.next_rung(rtol)
             continue
