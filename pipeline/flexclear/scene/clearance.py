@@ -1,15 +1,14 @@
-"""Contacts in a scene: geometry, materials, normal law, friction law; and the friction of ideal joints.
+"""Contacts in a scene: geometry, materials, normal law, friction law.
 
 The friction law 'modified-coulomb' is described in `dynamics.contact.friction.modified_coulomb`.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, Union, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, model_validator
 
-from flexclear.scene import law_expressions
-from flexclear.scene.fields import Force, Length, Mass, Number, Part, Positive, Pressure, Speed
-from flexclear.scene.laws import Value
+from flexclear.scene.fields import Length, Mass, Number, Part, Positive, Pressure, Speed
+from flexclear.scene.law_expressions import FrictionExpression, NormalExpression
 
 Share = Field(ge=0.0, le=1.0)
 
@@ -163,46 +162,6 @@ class KelvinVoigt(_Normal):
         return self
 
 
-class NormalExpression(Part):
-    """A law of one's own: the normal force as an expression, which is never negative where the run uses it.
-
-    Variables are the penetration `depth`, its rate, and `impact_rate`, the rate at which this contact began. What the
-    force is at rate 0 is stored, the rest is damping.
-    """
-
-    law: Literal["expression"]
-    force: str
-    """the expression, as ``K*depth^1.5*(1 + a*rate/impact_rate)``"""
-    values: dict[str, Value] = Field(default_factory=dict)
-    """named constants of the expression, each a number or text with its unit"""
-    restitution: Annotated[Number, Share] | None = None
-    """restitution that the damping is meant to cause; the expression may contain it"""
-
-    stiffness: ClassVar[None] = None
-    needs_mass: ClassVar[bool] = False
-    needs_materials: ClassVar[bool] = False
-
-    @property
-    def named(self) -> dict[str, Any]:
-        """Named values of the expression, the restitution last."""
-        return self.values | ({} if self.restitution is None else {"restitution": self.restitution})
-
-    @property
-    def encoded(self) -> tuple[str, tuple[float, ...]]:
-        """Structure and values of the expression (`scene.law_expressions`)."""
-        return law_expressions.encoded(self.force, self.named, law_expressions.NORMAL)
-
-    @property
-    def kind(self) -> str:
-        """Structure of the expression."""
-        return self.encoded[0]
-
-    def check(self, *, turning: bool = False) -> None:
-        """Raise ValueError, in words, for an expression without meaning. turning: for the end of an angle."""
-        variables, dimension = (law_expressions.ANGULAR, "torque") if turning else (law_expressions.NORMAL, "force")
-        law_expressions.check("normal.force", self.force, self.named, variables, dimension)
-
-
 NormalLaw = Annotated[Hertz | Hysteretic | KelvinVoigt | NormalExpression, Field(discriminator="law")]
 #: all kinds of normal laws
 NORMALS: tuple[Any, ...] = get_args(get_args(NormalLaw)[0])
@@ -293,30 +252,6 @@ class LuGre(_Friction):
         return self
 
 
-class FrictionExpression(_Friction):
-    """A law of one's own: the coefficient of friction as an expression of the sliding speed and the normal force."""
-
-    law: Literal["expression"]
-    coefficient: str
-    """the expression of `slip` and `normal_force`, zero at rest, as ``mu*tanh(slip/v)``"""
-    values: dict[str, Value] = Field(default_factory=dict)
-    """named constants of the expression, each a number or text with its unit"""
-
-    @property
-    def encoded(self) -> tuple[str, tuple[float, ...]]:
-        """Structure and values of the expression (`scene.law_expressions`)."""
-        return law_expressions.encoded(self.coefficient, self.values, law_expressions.SLIDING)
-
-    @property
-    def kind(self) -> str:
-        """Structure of the expression."""
-        return self.encoded[0]
-
-    def check(self) -> None:
-        """Raise ValueError, in words, for an expression without meaning."""
-        law_expressions.check("friction.coefficient", self.coefficient, self.values, law_expressions.SLIDING, "number")
-
-
 Friction = Annotated[ModifiedCoulomb | Ambrosio | LuGre | FrictionExpression, Field(discriminator="law")]
 #: all friction laws
 FRICTIONS: tuple[Any, ...] = get_args(get_args(Friction)[0])
@@ -340,57 +275,3 @@ class Wear(Part):
     sectors: Annotated[int, Field(ge=4, le=720)] = 36
     """number of sectors about their axis into which both surfaces are divided for the map of depths; a ball and its
     socket also into bands of equal area"""
-
-
-#: sizes that the bearing of a joint may have, and those that it must have
-SIZES: dict[str, tuple[set[str], set[str]]] = {
-    "revolute": ({"radius", "length", "axial_radius"}, {"radius"}),
-    "prismatic": ({"radius", "length"}, set()),
-    "cylindrical": ({"radius", "length"}, {"radius"}),
-    "universal": ({"radius", "length"}, {"radius"}),
-    "spherical": ({"radius"}, {"radius"}),
-}
-
-
-class _Bearing(Part):
-    """Surfaces of an ideal joint with friction; loads whose conversion needs an absent size are not counted."""
-
-    radius: Annotated[Length, Positive] | None = None
-    """radius of the pin, the ball, or the pins of a universal joint's cross; of a prismatic joint the lever arm of the
-    pads that carry moments about its axis"""
-    length: Annotated[Length, Positive] | None = None
-    """distance between the two ends that carry moments across the axis; of a prismatic joint the length of the slider,
-    its middle at the second frame's origin"""
-    axial_radius: Annotated[Length, Positive] | None = None
-    """radius of the collar that carries the axial force of a revolute joint; default: `radius`"""
-    preload: Annotated[Force, Field(ge=0.0)] = 0.0
-    """constant normal force, added to the others"""
-
-
-def _bearing_model(law: Any) -> Any:
-    """Return a model with the parameters of a friction law and those of a bearing."""
-    return create_model(f"{law.__name__}Bearing", __base__=(_Bearing, law), __doc__=law.__doc__, __module__=__name__)
-
-
-if TYPE_CHECKING:
-    JointFriction: TypeAlias = Any
-else:
-    JointFriction = Annotated[Union[tuple(_bearing_model(law) for law in FRICTIONS)], Field(discriminator="law")]  # noqa: UP007
-
-
-def require_fitting(kind: str, friction: Any) -> None:
-    """Raise ValueError for a joint type without friction, and for sizes that its bearing lacks or cannot have."""
-    if kind not in SIZES:
-        known = ", ".join(SIZES)
-        raise ValueError(f"a joint of type '{kind}' has no friction of its own; those that have: {known}")
-    if "x1" in friction.kind.split(","):
-        raise ValueError("friction of an ideal joint depends on the slip alone: its coefficient has no normal_force")
-    possible, needed = SIZES[kind]
-    given = {name for name in ("radius", "length", "axial_radius") if getattr(friction, name) is not None}
-    for name in sorted(needed - given):
-        raise ValueError(
-            f"friction in a {kind} joint needs a {name}, the lever arm of the friction force; none is given"
-        )
-    for name in sorted(given - possible):
-        may = ", ".join(sorted(possible))
-        raise ValueError(f"the bearing of a {kind} joint has no {name}; sizes of such a joint: {may}")

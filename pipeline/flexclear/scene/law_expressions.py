@@ -5,11 +5,11 @@ The text is the expression in postfix order, behind "expression", separated by c
 same text, and share compiled code.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
 
 from flexclear.scene.expression import (
     Local,
@@ -20,6 +20,8 @@ from flexclear.scene.expression import (
     refuse_jump,
     require_used,
 )
+from flexclear.scene.fields import Number, Part
+from flexclear.scene.laws import Value
 
 #: variables of the normal force, at the end of an angle too, and of a coefficient of friction
 NORMAL = {"depth": Local("x0", "m"), "rate": Local("x1", "m/s"), "impact_rate": Local("x2", "m/s")}
@@ -75,3 +77,67 @@ def _encoded(
         return ",".join([*operands, operator])
 
     return f"expression,{fold(steps, leaf, apply)}", tuple(value for value, _ in constants.values()), tuple(steps)
+
+
+class NormalExpression(Part):
+    """A law of one's own: the normal force as an expression, which is never negative where the run uses it.
+
+    Variables are the penetration `depth`, its rate, and `impact_rate`, the rate at which this contact began. What the
+    force is at rate 0 is stored, the rest is damping.
+    """
+
+    law: Literal["expression"]
+    force: str
+    """the expression, as ``K*depth^1.5*(1 + a*rate/impact_rate)``"""
+    values: dict[str, Value] = Field(default_factory=dict)
+    """named constants of the expression, each a number or text with its unit"""
+    restitution: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
+    """restitution that the damping is meant to cause; the expression may contain it"""
+
+    stiffness: ClassVar[None] = None
+    needs_mass: ClassVar[bool] = False
+    needs_materials: ClassVar[bool] = False
+
+    @property
+    def named(self) -> dict[str, Any]:
+        """Named values of the expression, the restitution last."""
+        return self.values | ({} if self.restitution is None else {"restitution": self.restitution})
+
+    @property
+    def encoded(self) -> tuple[str, tuple[float, ...]]:
+        """Structure and values of the expression (`encoded`)."""
+        return encoded(self.force, self.named, NORMAL)
+
+    @property
+    def kind(self) -> str:
+        """Structure of the expression."""
+        return self.encoded[0]
+
+    def check(self, *, turning: bool = False) -> None:
+        """Raise ValueError, in words, for an expression without meaning. turning: for the end of an angle."""
+        variables, dimension = (ANGULAR, "torque") if turning else (NORMAL, "force")
+        check("normal.force", self.force, self.named, variables, dimension)
+
+
+class FrictionExpression(Part):
+    """A law of one's own: the coefficient of friction as an expression of the sliding speed and the normal force."""
+
+    law: Literal["expression"]
+    coefficient: str
+    """the expression of `slip` and `normal_force`, zero at rest, as ``mu*tanh(slip/v)``"""
+    values: dict[str, Value] = Field(default_factory=dict)
+    """named constants of the expression, each a number or text with its unit"""
+
+    @property
+    def encoded(self) -> tuple[str, tuple[float, ...]]:
+        """Structure and values of the expression (`encoded`)."""
+        return encoded(self.coefficient, self.values, SLIDING)
+
+    @property
+    def kind(self) -> str:
+        """Structure of the expression."""
+        return self.encoded[0]
+
+    def check(self) -> None:
+        """Raise ValueError, in words, for an expression without meaning."""
+        check("friction.coefficient", self.coefficient, self.values, SLIDING, "number")

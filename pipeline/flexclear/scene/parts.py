@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from flexclear.scene.clearance import JointFriction, NormalLaw, require_fitting
+from flexclear.scene.bearings import JointFriction, require_fitting
+from flexclear.scene.clearance import NormalLaw
 from flexclear.scene.fields import (
     AngularVelocity,
     FrameName,

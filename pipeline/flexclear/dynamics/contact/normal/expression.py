@@ -15,7 +15,7 @@ import numpy as np
 from flexclear.dynamics.contact.expression import composed, zeros
 from flexclear.dynamics.contact.form.expression import KINKS, form_of
 from flexclear.dynamics.contact.law import RESTITUTION_ERROR, Numbers, Resolved
-from flexclear.scene.clearance import NormalExpression
+from flexclear.scene.law_expressions import NormalExpression
 
 #: most kinks of the elastic force, and a penetration that none reaches
 MOST_KINKS, NEVER = 2, 1e300
