@@ -301,6 +301,7 @@ def test_a_rod_of_any_size_is_held_in_equilibrium(
     held, expected = bent(tmp_path, mass, load, solver)
     place = held.frame_position.sel(frame="rod.tip").values[:, 1]
     np.testing.assert_allclose(place, expected, rtol=1e-3)  # resolved to a thousandth
+    assert float(lost_energy(held).max()) < 1e-3  # and the answer on stability agrees
 
 
 def test_steps_over_many_vibrations_hold_a_rod_at_rest(tmp_path: Path) -> None:

@@ -113,24 +113,24 @@ def _tolerance(solver: Solver) -> float:
     return solver.ledger_tolerance or default_energy_error(solver)
 
 
-def _unresolved(solver: Solver, kinetic: float, elastic: float) -> float:
-    """Return the energy error that the tolerance leaves to a state that elastic parts hold at rest [J].
+def _held(solver: Solver, kinetic: float, elastic: float) -> float:
+    """Return the energy that counts as exchanged at least [J], for states that elastic parts hold at rest.
 
-    Such a state exchanges no energy. An error e of a state that stores E changes forces and deflections by sqrt(e/E).
+    An error e of a state that stores E changes its forces and deflections by sqrt(e/E), which the tolerance resolves.
     kinetic, elastic: largest energies [J].
     """
     tolerance = _tolerance(solver)
     # 1e-16: speeds that are a hundred-millionth of those with which E would be exchanged are rounding and the residue
     # of the equilibrium; steps over many vibrations take one for a motion that lasts the whole step
     if kinetic <= 1e-16 * elastic:
-        return tolerance * elastic
+        return elastic
     # fixed steps either diverge or leave no vibration, adaptive ones at the limit of stability one within the tolerance
-    return 0.0 if solver.step is not None else min(tolerance, PER_RTOL * solver.rtol) ** 2 * elastic
+    return 0.0 if solver.step is not None else min(tolerance, PER_RTOL * solver.rtol) ** 2 / tolerance * elastic
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Energy error at the rows of a run, the energy exchanged, and what counts as rounding [J].
+    """Energy error at the rows of a run, the energy exchanged, and the rounding of the largest energy [J].
 
     of: the mechanism whose energies these are, in words; empty for all bodies.
     """
@@ -176,9 +176,9 @@ def balance(model: Model, seen: Observed, component: int | None = None) -> Balan
     # 1e-14: roundings of the work that the largest force does over the size of the mechanism: a force that holds it at
     # rest does work by the rounding of its positions
     # 1e-30: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
-    held = _unresolved(model.scene.solver, *(float(np.abs(totals[n]).max()) for n in ("kinetic", "elastic")))
-    rounding = max(1e-12 * largest, 1e-14 * _largest_work(model, seen, component), held, 1e-30)
-    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, rounding)
+    rounding = max(1e-12 * largest, 1e-14 * _largest_work(model, seen, component), 1e-30)
+    held = _held(model.scene.solver, *(float(np.abs(totals[n]).max()) for n in ("kinetic", "elastic")))
+    return Balance(of, totals, np.abs(totals["energy_error"]), max(exchanged, held), rounding)
 
 
 def _largest_work(model: Model, seen: Observed, component: int | None) -> float:
