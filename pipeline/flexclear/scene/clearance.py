@@ -57,7 +57,7 @@ class _Normal(Part):
 
     @property
     def kind(self) -> str:
-        """What code of the law depends on besides its name: form of a tight fit, or structure of an expression."""
+        """Form of a tight fit, or structure of an expression; empty for laws whose code has none."""
         return ""
 
 
