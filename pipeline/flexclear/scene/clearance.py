@@ -95,7 +95,7 @@ class _Elastic(_Normal):
 
     @property
     def kind(self) -> str:
-        """Form of a tight fit."""
+        """Return the form of a tight fit."""
         return self.form or ""
 
 
@@ -172,7 +172,7 @@ class _Friction(Part):
 
     @property
     def kind(self) -> str:
-        """Name of the law, with the structure of its expression."""
+        """Return the name of the law, with the structure of its expression."""
         return str(self.law)  # type: ignore[attr-defined]
 
 

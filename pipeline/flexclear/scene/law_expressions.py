@@ -110,7 +110,7 @@ class NormalExpression(Part):
 
     @property
     def kind(self) -> str:
-        """Structure of the expression."""
+        """Return the structure of the expression."""
         return self.encoded[0]
 
     def check(self, *, turning: bool = False) -> None:
@@ -135,7 +135,7 @@ class FrictionExpression(Part):
 
     @property
     def kind(self) -> str:
-        """Structure of the expression."""
+        """Return the structure of the expression."""
         return self.encoded[0]
 
     def check(self) -> None:
