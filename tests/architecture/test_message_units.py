@@ -35,6 +35,7 @@ ELSEWHERE = {
     ("pipeline/flexclear/dynamics/model/given_start.py", "turned"): {"rad", "deg"},
     ("pipeline/flexclear/dynamics/model/closing.py", "turned"): {"deg"},
     ("pipeline/flexclear/dynamics/model/contacts.py", "radius"): {"m", "mm"},
+    ("pipeline/flexclear/dynamics/contact/normal/expression.py", "speed"): {"m/s"},
     ("pipeline/flexclear/dynamics/stepwise.py", "resolved"): {"s"},
     ("pipeline/flexclear/post/answers/plan.py", "frequency"): {"%"},
     ("papers/wang_wang_2019/figures/errors.py", "interval"): {"ms"},

@@ -48,7 +48,7 @@ def resolve(law: NormalExpression, mass: float | None, reach: float) -> Resolved
     for speed, e in zip(SPEEDS, found, strict=True):
         if e > 1.0 + ROUNDING:
             raise ValueError(
-                f"{text} feeds energy: a free impact at {speed:g} m/s rebounds with {e:.4g} times this speed; damping "
+                f"{text} feeds energy: a free impact at {speed:g} m/s or rad/s rebounds with {e:.4g} of it; damping "
                 "is positive where rate is"
             )
     delivered = found[1] if damped else 1.0
