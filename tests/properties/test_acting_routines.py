@@ -256,7 +256,7 @@ def pressed_rods() -> Table:
 @pytest.mark.parametrize("name", ["friction", "friction in a loop", "pressed"])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_forces_act_on_flexible_bodies_as_by_kernels(name: str) -> None:
-    found = evaluated(tabulated(Scene.model_validate(BENT[name] if name in BENT else pressed_rods()), True))
+    found = evaluated(tabulated(Scene.model_validate(BENT[name] if name in BENT else pressed_rods())))
     assert found.model.parts.flexible
     assert_rubs_alike(found)
 

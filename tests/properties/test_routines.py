@@ -103,13 +103,13 @@ def assert_alike(found: Evaluated) -> None:
 
 @pytest.mark.parametrize("name", TREES)
 def test_trees_move_as_by_kernels(name: str) -> None:
-    assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]), True)))
+    assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]))))
 
 
 @pytest.mark.parametrize("name", [name for name in BENT if "friction" not in name])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_flexible_bodies_move_as_by_kernels(name: str) -> None:
-    assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]), True)))
+    assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]))))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -168,7 +168,7 @@ def bent(number: int) -> Model:
     given = {"children": children, "closed": str(random.choice(["", "spherical", "revolute"]))}
     angles = tuple((turned * random.uniform(-1.2, 1.2, size=3)).tolist())
     scene = bending(references, kinds, angles, **given, driven=driven, stiffening=stiffening)
-    return tabulated(Scene.model_validate(scene), True)
+    return tabulated(Scene.model_validate(scene))
 
 
 @pytest.mark.parametrize("number", range(20))
@@ -192,7 +192,7 @@ def test_rounding_does_not_grow_with_the_distance_from_the_origin() -> None:
 @pytest.mark.parametrize("coaxial", [True, False])
 def test_coordinates_that_move_no_mass_are_noticed(coaxial: bool) -> None:
     with np.errstate(invalid="ignore"):
-        found = evaluated(tabulated(Scene.model_validate(massless(coaxial)), True))
+        found = evaluated(tabulated(Scene.model_validate(massless(coaxial))))
     assert by_routines(found)[1][m.EVALUATION] == found.report == (m.NOT_POSITIVE if coaxial else m.OK)
 
 

@@ -74,8 +74,8 @@ class Composition:
 
     @property
     def tree(self) -> str:
-        """Name of the module that factors the mass matrix."""
-        return self.take(f"{DYNAMICS}.equations", "articulated" if self.parts.articulated else "composite")
+        """Name of the module that eliminates along the tree."""
+        return self.take(f"{DYNAMICS}.equations", "articulated")
 
     @property
     def forms(self) -> str:
