@@ -165,8 +165,11 @@ class Room:
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`). RATES: the function that steps
-#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`)
-EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS = ADDRESSES = _indices(8)
+#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`);
+#: RUN: the function that runs other lists: CORRECT, DISPLACE, and SPRINGS in two parts (`mechanics.responses`)
+EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RUN, CORRECT, DISPLACE, SPRINGS = _indices(11)
+ADDRESSES = range(EVALUATE, SPRINGS + 1)
+PART = 32  #: bytes from a part of a list to the next
 
 # Topology in h -------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
@@ -327,7 +330,7 @@ AXES, COUPLING, READING, LIFTING, RESPONSE = _stretches(
 #: (z, z') of each oscillator; its phi functions in each quadrature, and the contributions of four sources to (z, z') by
 #: them, weights of 1 and Lambda each (`integrate.exponential`)
 OSCILLATIONS, QUADRATURES = work("z rate", "oscillations*nv"), work("phi:10 share:8", "quadratures*nv")
-MAGNITUDE, CORRECTION, LATCHED = _stretches("magnitude:n_groups correction:nv latched:n_contacts")
+MAGNITUDE, LATCHED = _stretches("magnitude:n_groups latched:n_contacts")
 #: watched values of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force; slip_rate:
 #: rate of the sliding speed, 0 where unknown; event_row: of its last closing; mode0, latched0: mode and impact rate
 #: that hold within the step

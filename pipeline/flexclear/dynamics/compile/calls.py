@@ -102,9 +102,30 @@ def project(h, f, w, n, t, y, dy, tolerance):
 
 
 @kernel
-def retract(d, y, retractment, out, total):
-    """Store the positions after a retractment: `equations.retraction`."""
-    call(d.h[m.RETRACT], (d.h, d.f, d.w, d.n, y, retractment, out, total))
+def correct(h, f, w, n, t, y, dy):
+    """Store, as rates of the state evaluated last, the changes that close its loops: `mechanics.responses`."""
+    call(h[m.RUN], (h, f, w, n, float(t), y, dy, h[m.CORRECT]))
+
+
+@kernel
+def retract(d, y, displacement, out):
+    """Store the positions after a displacement; all are indices in w."""
+    for k in range(d.nq):
+        d.w[out + k] = d.w[y + k]
+    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, d.time, out, displacement - d.nq, d.h[m.DISPLACE]))
+
+
+@kernel
+def factor_springs(d, t, y):
+    """Prepare `release_spring` for a state."""
+    laws(d.h, d.f, d.w, d.n, t)
+    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, float(t), y, y, d.h[m.SPRINGS]))
+
+
+@kernel
+def release_spring(d, t, y, response):
+    """Replace forces on modes, in a row like the state's rates, by what they cause."""
+    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, float(t), y, response, d.h[m.SPRINGS] + m.PART))
 
 
 @kernel

@@ -39,7 +39,6 @@ FUNCTIONS: dict[str, tuple[str, int | None]] = {
     "advance": ("integrator", None),
     "prescribe": ("laws of time", m.PRESCRIBE),
     "project": ("projection onto loop closures", m.PROJECT),
-    "retract": ("retraction of positions", m.RETRACT),
     "observe": ("outputs", None),
     "evaluate": ("equations of motion", m.EVALUATE),
     "describe": ("outputs", m.DESCRIBE),

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 from flexclear.dynamics.compile import formulas
 from flexclear.dynamics.effects import Parts, Scheme
 from flexclear.dynamics.effects.effect import Effect
-from flexclear.scene import integrators
 
 if TYPE_CHECKING:
     from flexclear.dynamics.specialise.topology import Topology
@@ -139,10 +138,6 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     by_name = {"prescribe": _laws(parts).calling("prescribe", "t")}
     if parts.closures:
         by_name["project"] = _projection(parts).text(PROJECT)
-    if integrators.INTEGRATORS[scheme.integrator].retracts:
-        maker = (f"{DYNAMICS}.equations.retraction", "make_retraction")
-        retraction = _joints(parts, "retraction of", "retraction", maker)
-        by_name["retract"] = retraction.calling("retract", "y, displacement, out, total")
     events = _steps(parts, scheme, f"events in steps of {scheme}", "resolution", "make_resolution")
     if "events" in events.given:
         events.take(f"{DYNAMICS}.fields", "data")
@@ -265,14 +260,8 @@ def _equations(parts: Parts, *, whole: bool = True) -> Composition:
 
 def _projection(parts: Parts) -> Composition:
     """Return a file for the projection onto the closures."""
-    projection = f"{DYNAMICS}.equations.projection"
-    file = _joints(parts, "projection with", "projection", (projection, "make_projection"))
-    file.given["evaluate"] = "calls.evaluate"
-    file.add_closures()
-    if parts.flexible:
-        stiffen = file.take(projection, "make_stiffen")
-        file.given["stiffen"] = f"{stiffen}({file.given['closures']}, {file.tree}, {file.flexible})"
-        file.given["to_modes"] = file.take(f"{DYNAMICS}.bodies.interface", "to_modes")
+    file = Composition(parts, "projection", "projection", (f"{DYNAMICS}.equations.projection", "make_projection"))
+    file.given = {"evaluate": "calls.evaluate", "correct": "calls.correct"}
     return file
 
 
@@ -309,11 +298,9 @@ def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> 
     file.given = {
         "evaluate": "calls.rates",
         "project": file.projection,
-        "retract": "calls.retract",
+        "lists": "calls",
         "method": file.part("METHODS", scheme.integrator),
     }
-    if integrators.INTEGRATORS[scheme.integrator].reads_all:
-        file.given["complete"] = f"(calls.evaluate, {file.tree})"
     events = _events(file, scheme)
     if events:
         file.given["events"] = events

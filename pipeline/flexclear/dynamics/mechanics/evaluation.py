@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from flexclear.dynamics import memory as m
@@ -15,7 +16,7 @@ from flexclear.dynamics.mechanics.trees import (
     Columns,
     Coordinates,
 )
-from flexclear.dynamics.mechanics.vectors import Wrench
+from flexclear.dynamics.mechanics.vectors import ZERO, Wrench
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell, routine
 from flexclear.dynamics.routines.symbols import select
 
@@ -80,8 +81,11 @@ def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
     return powers
 
 
-def eliminated(mechanism: Mechanism) -> Any:
-    """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass."""
+def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
+    """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass.
+
+    slowness: share [s^2] of their stiffness that modes have in their mass.
+    """
     sound: Any = 1.0
     for link in reversed(mechanism.links):
         carried_on = int(link.on_link)
@@ -90,6 +94,8 @@ def eliminated(mechanism: Mechanism) -> Any:
             for station in modes.stations:
                 more = f.bend(more, station, modes.q)
             need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
+            if slowness:
+                need = need._replace(m=f.stiffened(need.m, modes.stiffness, slowness))
             modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
         elif link.driven or link.rubbed:
             link.rest = t.resist(link.motion, link.body, link.beyond)
@@ -114,7 +120,7 @@ class Spread(NamedTuple):
 
 class Loops(NamedTuple):
     """Closures that are solved for: their rows passed to the ground, with their wrenches on the second body, and their
-    multipliers; the factor of their matrix, and its smallest pivot."""
+    multipliers, or what these must supply; the factor of their matrix, and its smallest pivot."""
 
     found: dict[int, Spread]
     on_second: dict[int, c.Wrenches]
@@ -127,8 +133,8 @@ class Loops(NamedTuple):
         return dict(zip(self.found, c.solved(self.L, right), strict=True))
 
 
-def closed(mechanism: Mechanism, calls: CallList) -> Loops:
-    """Add the closures' forces to those of all links."""
+def linked(mechanism: Mechanism, calls: CallList) -> Loops:
+    """Pass the rows of all closures to the ground, and factorise their matrix."""
     found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
     numbers, on_second = list[int](), dict[int, c.Wrenches]()
     for number, one in enumerate(mechanism.closures):
@@ -151,8 +157,15 @@ def closed(mechanism: Mechanism, calls: CallList) -> Loops:
         return Loops({}, {}, {}, {}, 1.0)
     L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
     calls.write([mechanism.least_pivot], [least])
-    multipliers = dict(zip(numbers, c.solved(L, right), strict=True))
-    loops = Loops(dict(zip(numbers, found, strict=True)), on_second, multipliers, L, least)
+    ways, supplied = (dict(zip(numbers, one, strict=True)) for one in (found, right))
+    return Loops(ways, on_second, supplied, L, least)
+
+
+def closed(mechanism: Mechanism, calls: CallList) -> Loops:
+    """Add the closures' forces to those of all links."""
+    loops = linked(mechanism, calls)
+    multipliers = loops.solved(list(loops.multipliers.values()))
+    loops = loops._replace(multipliers=multipliers)
     for number, mine in loops.found.items():
         for moved, V in mine.V.items():
             moved.forces = c.with_multipliers(moved.forces, V, multipliers[number])
@@ -171,7 +184,7 @@ def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
             if calls:
                 link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
             else:
-                _, link.acceleration = t.accelerate("fixed", Coordinates((), (), ()), *given)
+                link.changes, link.acceleration = t.accelerate("fixed", Coordinates((), (), ()), *given)
         if modes := link.modes:
             on_shapes = modes.gains, modes.forces, link.acceleration
             if calls:
@@ -239,16 +252,29 @@ def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
     forces: dict[Link | Modes, t.Numbers] = {moved: [row[k] for row in V] for moved, V in spread.V.items()}
     right = list[Any]()
     for number, one in loops.found.items():
-        rows: c.Rows = [[0.0]] * len(loops.multipliers[number])
+        rows: c.Rows = [[0.0]] * len(loops.on_second[number])
         for moved, V in one.V.items():
             if moved in forces:
                 rows = c.coupled(rows, V, [[force] for force in forces[moved]])
         right.append(c.opposite([row[0] for row in rows]))
+    multipliers = answered(loops, forces, right)
+    return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
+
+
+def answered(loops: Loops, forces: dict[Link | Modes, t.Numbers], right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
+    """Return the multipliers for right-hand sides, and add their part to forces."""
     multipliers = loops.solved(right)
     for number, one in loops.found.items():
         for moved, V in one.V.items():
             forces[moved] = c.with_multipliers(forces.get(moved, [0.0] * len(V)), V, multipliers[number])
-    return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
+    return multipliers
+
+
+def respond(mechanism: Mechanism, forces: Mapping[Link | Modes, t.Numbers]) -> None:
+    """Compute the accelerations by forces, given as L^-1 of them, alone."""
+    for moved in moving(mechanism):
+        moved.forces = forces.get(moved, [0.0] * len(moved.forces))
+    accelerated(mechanism)
 
 
 def reactions_of(
@@ -259,9 +285,7 @@ def reactions_of(
     accelerated(mechanism)
     smooth, parts = [reaction(loops, joint) for joint in joints], list[list[Wrench]]()
     for by, of_joint in influences:
-        for moved, forces in without.items():
-            moved.forces = by.forces.get(moved, [0.0] * len(forces))
-        accelerated(mechanism)
+        respond(mechanism, by.forces)
         parts.append([reaction(loops, joint, by, own=joint is of_joint) for joint in joints])
     for moved, forces in without.items():
         moved.forces = forces
@@ -298,9 +322,13 @@ def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tup
     return L, least
 
 
-def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
-    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
-    found, waiting, loads = Spread({}, {}), dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
+def passed_inwards(
+    ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers, on_shapes: Mapping[Link, c.Rows] = MappingProxyType({})
+) -> tuple[Spread, t.Numbers, c.Rows]:
+    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them; on_shapes: forces
+    on the shapes of links, per row."""
+    found, loads = Spread({}, {}), {link: list[tuple[c.Wrenches, Columns]]() for link in on_shapes}
+    waiting = dict.fromkeys(on_shapes, [Wrench(ZERO, ZERO)] * len(gamma))
     S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
 
     def receive(frame: Frame, wrenches: c.Wrenches) -> None:
@@ -315,7 +343,8 @@ def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -
         link = max(waiting, key=lambda link: link.depth)
         wrenches, carried_on = waiting.pop(link), int(link.on_link)
         if modes := link.modes:
-            modal = modes.gains, modes.forces, loads[link], wrenches, gamma, S
+            forces = on_shapes.get(link, [[0.0] * len(modes.forces)] * len(gamma))
+            modal = modes.gains, modes.forces, forces, loads[link], wrenches, gamma, S
             found.V[modes], gamma, S, wrenches = f.spread(*modal)
         if link.driven or link.rubbed:
             found.through[link] = wrenches

@@ -171,12 +171,19 @@ def moving(basis: Places, T: Numbers, held: int, q: Numbers) -> list[Any]:
     return p
 
 
+@routine
 def in_shapes(basis: Places, T: Numbers, values: Sequence[Any], nothing: Any = 0.0) -> list[Any]:
     """Return T^T values: forces on shapes from those on modes."""
     out = [nothing] * len(values)
     for (mode, shape), t in zip(basis, T, strict=True):
         out[shape] = out[shape] + t * values[mode]
     return out
+
+
+@routine
+def in_modes(basis: Places, T: Numbers, values: Sequence[Any]) -> list[Any]:
+    """Return T values: rates of modes from those of shapes."""
+    return in_shapes([(shape, mode) for mode, shape in basis], T, values)
 
 
 # Frames ---------------------------------------------------------------------------------------------------------------
@@ -291,6 +298,12 @@ def bend(forces: Numbers, station: Station, q: Numbers) -> list[Any]:
 
 
 @routine
+def stiffened(mass: Rows, stiffness: Rows, share: float) -> list[Any]:
+    """Return the mass of shapes with a share [s^2] of their stiffness, rows up to the diagonal."""
+    return [[a + share * b for a, b in zip(*rows, strict=True)] for rows in zip(mass, stiffness, strict=True)]
+
+
+@routine
 def eliminate(body: Need, beyond: Sequence[Beyond], sound: Any) -> tuple[Gains, list[Any], Resistance, Any]:
     """Eliminate the shapes of a body from its inertia with all that it carries.
 
@@ -317,11 +330,19 @@ def eliminate(body: Need, beyond: Sequence[Beyond], sound: Any) -> tuple[Gains, 
 
 @routine
 def spread(
-    gains: Gains, forces: Numbers, loads: Sequence[tuple[Wrenches, Columns]], wrenches: Wrenches, *rows: Any
+    gains: Gains,
+    forces: Numbers,
+    on_shapes: Rows,
+    loads: Sequence[tuple[Wrenches, Columns]],
+    wrenches: Wrenches,
+    *rows: Any,
 ) -> Any:
     """Eliminate the shapes of a body from the rows of a closure, as `closures.spread` does for the coordinates of its
-    joint; loads: wrenches at ports, and the motion of these per rate of each shape; wrenches: all together."""
-    on_shapes = [[0.0] * len(forces) for _ in wrenches]
+    joint.
+
+    on_shapes: forces on the shapes, per row.  loads: wrenches at ports, and the motion of these per rate of each shape;
+    wrenches: all together.
+    """
     for given, columns in loads:
         on_shapes = [
             [f + wrench.on(column) for f, column in zip(row, columns, strict=True)]
@@ -340,8 +361,7 @@ def accelerate(basis: Places, T: Numbers, u: Numbers, gains: Gains, forces: Numb
     a: acceleration of the body as if rigid, without the known part.
     """
     shapes = backward(gains.L, [force - k.on(a) for force, k in zip(forces, gains.K, strict=True)])
-    modes = in_shapes([(shape, mode) for mode, shape in basis], T, shapes)
-    return [*u, *modes], shapes
+    return [*u, *in_modes(basis, T, shapes)], shapes
 
 
 @routine

@@ -90,7 +90,8 @@ class Modes:
 
     inboard: frame of the body's joint on the body.  q, u: coordinates and their rates.  rates: where the rates of these
     are stored.  places, basis: see `flexible.need`; held: shapes that move no frame.  stations: of a rod that loads
-    stiffen.  book: of the ledger, for the loss.  The others follow as `flexible` has them.
+    stiffen.  stiffness: in shapes, rows up to the diagonal.  book: of the ledger, for the loss.  The others follow as
+    `flexible` has them.
     """
 
     inboard: Site | f.Port
@@ -102,6 +103,7 @@ class Modes:
     basis: f.Places
     held: int
     stations: Sequence[f.Station]
+    stiffness: c.Rows
     book: int
     twists: Columns = field(init=False)
     gains: f.Gains = field(init=False)
@@ -122,7 +124,7 @@ class Link(Carrier):
     frame: of the joint, on the parent.  body: of a rigid body.  modes: of a flexible one.  rates: where those of its
     positions and speeds are stored.  book: of the ledger, for its drives.  rubbed: True when its joint rubs.  The
     others follow as `trees` has them; closing: wrenches of the closures on it and all beyond, by rows, and the
-    multipliers.
+    multipliers; changes: of its speeds, by forces alone.
     """
 
     frame: Frame
@@ -138,6 +140,7 @@ class Link(Carrier):
     rest: Resistance = field(init=False)
     gains: t.Gains = field(init=False, default=())
     forces: t.Numbers = field(init=False, default=())
+    changes: t.Numbers = field(init=False, default=())
     closing: list[tuple[c.Wrenches, t.Numbers]] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
@@ -158,15 +161,17 @@ class Closure(NamedTuple):
     """A joint that closes a loop, or a gear. frames: on whose bodies its rows act.
 
     routine: takes what is given, the number of rows solved for, and the frames' ends, and returns what is stored in
-    `results`, then gamma of those rows and their wrenches on each body; see `closures.closure`.  diagonal, roots: of
-    the rows solved for, where the diagonal of J M^-1 J^T and of its inverse factor are stored.  scales: reference of
-    each pivot.
+    `results`, then gamma of those rows and their wrenches on each body; see `closures.closure`.  residuals, opening:
+    of the rows solved for, those results, and their rates.  diagonal, roots: where the diagonal of J M^-1 J^T and of
+    its inverse factor are stored.  scales: reference of each pivot.
     """
 
     routine: Callable
     given: tuple[Any, ...]
     frames: Sequence[Frame]
     results: Cells
+    residuals: Cells
+    opening: Cells
     diagonal: Cells
     roots: Cells
     scales: Cells

@@ -14,6 +14,7 @@ from flexclear.dynamics.mechanics.evaluation import evaluated
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
 from flexclear.dynamics.mechanics.joints import JOINTS
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
+from flexclear.dynamics.mechanics.responses import listed
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
@@ -23,9 +24,10 @@ from flexclear.dynamics.specialise.code import Program
 from flexclear.dynamics.specialise.topology import Topology
 
 
-def list_of(parts: Parts, topology: Topology) -> CallList:
-    """Return the list of calls that evaluates a mechanism; see `evaluation.evaluated`."""
-    return evaluated(mechanism_of(Tables(parts, topology)), CallList())
+def list_of(parts: Parts, topology: Topology, where: int = m.CALLS) -> CallList:
+    """Return the list of calls that evaluates a mechanism, or another one by the place of its address in h."""
+    mechanism, calls = mechanism_of(Tables(parts, topology)), CallList()
+    return evaluated(mechanism, calls) if where == m.CALLS else listed(mechanism, calls, where)
 
 
 def program_of(parts: Parts, topology: Topology, longest: int) -> Program:
@@ -107,7 +109,9 @@ def _modes(tables: Tables, k: int) -> Modes:
     of_body, data = tables.row(m.FLEX_NUMBERS, k), _Stretch(tables, m.FLEX_DATA, body["data0"])
     linear, E, _, diagonals = (data.rows(count, n) for count in (3, 9, n, 2))
     in_shapes = _Stretch(tables, m.INTERFACE_DATA, body["interface0"])
-    moved, mass = in_shapes.rows(3, n), in_shapes.rows(n, n)
+    moved, mass, stiffness = in_shapes.rows(3, n), in_shapes.rows(n, n), in_shapes.rows(n, n)
+    # without held shapes, shapes are eigenmodes
+    stiff = [[stiffness[i][j] if i == j or i >= held > 0 else 0.0 for j in range(i + 1)] for i in range(n)]
     coupled = [int(body["coupled"]) and i >= held for i in range(n)]
     first, ends = int(body["moment_row0"]), table(m.MOMENT_ROWS)["end"]
     begin, entries = int(body["moment0"]), range(int(body["basis0"]), int(body["basis0"] + body["n_basis"]))
@@ -125,7 +129,7 @@ def _modes(tables: Tables, k: int) -> Modes:
         modal, cells(STATE, q, n), cells(STATE, u, n), [*cells(RATES, q, n), *cells(RATES, u, n)],
         tuple((int(r) // n, int(mode), int(r) % n) for r, mode in zip(rows, modes, strict=True)),
         tuple((int(mode), int(shape)) for mode, shape in table(m.BASIS)[entries.start : entries.stop]),
-        held, _stations(tables, k, n), int(body["book"]),
+        held, _stations(tables, k, n), stiff, int(body["book"]),
     )  # fmt: skip
 
 
@@ -159,12 +163,13 @@ def _closures(tables: Tables, frames: list[Frame]) -> list[Closure]:
         row0, count, kept0, kept = (int(one[name]) for name in ("row0", "n_rows", "kept0", "n_kept"))
         scales, diagonal = (tables.stretch(m.ROW_SCALE, first + kept0, kept) for first in (0, every))
         roots = [cell for r in range(kept0, kept0 + kept) for cell in tables.stretch(m.SCHUR, origins[r] + r, 1)]
-        residuals = [cell for at in (m.RESIDUAL, m.RESIDUAL_RATE) for cell in tables.stretch(at, row0, count)]
-        factor, of_joint = (diagonal, roots, scales), (tuple(rows[row0 : row0 + count]),)
+        residuals, opening = (tables.stretch(at, row0, count) for at in (m.RESIDUAL, m.RESIDUAL_RATE))
+        results, of_joint = [*residuals, *opening], (tuple(rows[row0 : row0 + count]),)
+        factor = residuals[:kept], opening[:kept], diagonal, roots, scales
         if one["coupling"] >= 0:
             which, given, joined, turning = gear(tables, frames, int(one["coupling"]))
-            made.append(Closure(which, given, joined, [*residuals, *turning], *factor))
+            made.append(Closure(which, given, joined, [*results, *turning], *factor))
         else:
             joined = [frames[one["site_a"]], frames[one["site_b"]]]
-            made.append(Closure(closure, of_joint, joined, residuals, *factor))
+            made.append(Closure(closure, of_joint, joined, results, *factor))
     return made

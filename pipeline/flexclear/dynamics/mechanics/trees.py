@@ -273,6 +273,28 @@ def accelerate(kind: str, coordinates: Coordinates, parent: Twist, step: Step, g
 
 
 @routine
+def turned(kind: str, x: Numbers, u: Numbers) -> list[Any]:
+    """Return the rates of a joint's positions at speeds, or their change by a small displacement."""
+    return list(JOINTS[kind].rate(x, u))
+
+
+@routine
+def displaced(kind: str, x: Numbers, by: Numbers) -> list[Any]:
+    """Return the positions of a joint after a displacement: at its constant speed, in one step of order 4.
+
+    This is exact for translations and single angles, and for quaternions to 3e-4 times the fifth power of the angle,
+    far below the error of a method of second order.
+    """
+    reached, slopes = list(x), list[Numbers]()
+    for reach in (0.5, 0.5, 1.0, 0.0):
+        slopes.append(JOINTS[kind].rate(reached, by))
+        reached = [one + reach * slope for one, slope in zip(x, slopes[-1], strict=True)]
+    first, second, third, fourth = slopes
+    total = [a + 2.0 * (b + c) + d for a, b, c, d in zip(first, second, third, fourth, strict=True)]
+    return [one + change / 6.0 for one, change in zip(x, total, strict=True)]
+
+
+@routine
 def follow(parent: Twist, step: Step) -> Twist:
     """Return the acceleration of a body whose coordinates are prescribed, without the known part."""
     return parent.at(step.p_PB)

@@ -97,12 +97,14 @@ def routine(function: Callable) -> Callable:
 class CallList:
     """A list of calls under construction.
 
-    size: number of results in memory; the first one is kept free, for what the list reports, as a `number`.
+    size: number of results in memory; the first one is kept free, for what the list reports, as a `number`.  ends: of
+    parts, which run one by one, with the results of those before.
     """
 
     number: ClassVar[type] = float
     calls: list[Call] = field(default_factory=list)
     size: int = 1
+    ends: list[int] = field(default_factory=list)
     _kinds: dict[Any, _Kind] = field(default_factory=dict)
     _known: dict[Any, Any] = field(default_factory=dict)
 
@@ -114,6 +116,10 @@ class CallList:
             yield self
         finally:
             _building.reset(token)
+
+    def divide(self) -> None:
+        """End a part of the list."""
+        self.ends.append(len(self.calls))
 
     @cached_property
     def codes(self) -> list[Code]:

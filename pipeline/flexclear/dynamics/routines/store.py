@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -36,14 +37,15 @@ class LoadedList:
     """A list of calls as the interpreter reads it.
 
     interpreter: its address.  codes: address per call.  offsets: of the runs of all calls, in their stretches of f and
-    w where they have some (`specialise.topology`).  begins: per call, the index of its first one.  size: number of
-    results.
+    w where they have some (`specialise.topology`).  begins: per call, the index of its first one.  parts: ends of all
+    parts.  size: number of results.
     """
 
     interpreter: int
     codes: np.ndarray
     offsets: np.ndarray
     begins: np.ndarray
+    parts: list[int]
     size: int
 
     def instance(self, h: np.ndarray) -> ListInstance:
@@ -51,20 +53,25 @@ class LoadedList:
         return ListInstance(self, h)
 
 
+#: bytes of a word
+WORD = 8
 #: lists of this process, by their files
 loaded: dict[Path, LoadedList] = {}
 
 
 class ListInstance:
-    """A list of calls with its results, for one engine. words: what the interpreter reads (`routines.emission`)."""
+    """A list of calls with its results, for one engine. words: what the interpreter reads (`routines.emission`), for
+    part after part."""
 
     def __init__(self, loaded: LoadedList, h: np.ndarray) -> None:
         self.loaded, self.results = loaded, np.zeros(loaded.size)
         stretch, inside = topologies.split(loaded.offsets)
         self._offsets = (np.where(stretch >= 0, h[stretch], 0) + inside).astype(np.int32)
         self._starts = (self._offsets.ctypes.data + self._offsets.itemsize * loaded.begins).astype(np.int64)
-        tables = (loaded.codes, self._starts, self.results)
-        self.words = np.array([len(loaded.codes), *(table.ctypes.data for table in tables)], dtype=np.int64)
+        codes, starts, results = (table.ctypes.data for table in (loaded.codes, self._starts, self.results))
+        parts = pairwise([0, *loaded.parts])
+        words = [(end - k, codes + WORD * k, starts + WORD * k, results) for k, end in parts]
+        self.words = np.array(words, dtype=np.int64)
 
 
 def stored(topology: bytes, build: Callable[[], CallList], report: Callable[[str], None]) -> LoadedList:
@@ -92,6 +99,17 @@ def load(calls: CallList, report: Callable[[str], None]) -> LoadedList:
     return _loaded(table, functions.assembled(dict(zip(table["names"], texts, strict=True)), report))
 
 
+def runner() -> int:
+    """Return the address of the function that runs a list which it is given."""
+    text = _runner()
+    return functions.assembled({_name(text.encode()): lambda: text}, lambda _: None).popitem()[1]
+
+
+@cache
+def _runner() -> str:
+    return interpreter_text(None)
+
+
 def _table(calls: CallList) -> dict[str, list]:
     """Return a list as numbers: names of the interpreter and its codes, code of each call, and offsets of its runs."""
     number = {id(code): k for k, code in enumerate(calls.codes, start=1)}
@@ -100,6 +118,7 @@ def _table(calls: CallList) -> dict[str, list]:
         "codes": [number[id(call.code)] for call in calls.calls],
         "counts": [len(call.offsets) for call in calls.calls],
         "offsets": [offset for call in calls.calls for offset in call.offsets],
+        "parts": calls.ends or [len(calls.calls)],
         "size": [calls.size],
     }
 
@@ -108,7 +127,7 @@ def _loaded(table: dict[str, list], at: dict[str, int]) -> LoadedList:
     addresses = np.array([at[name] for name in table["names"]], dtype=np.int64)
     begins = np.cumsum([0, *table["counts"]])[:-1]
     offsets = np.array(table["offsets"], dtype=np.int64)
-    return LoadedList(int(addresses[0]), addresses[table["codes"]], offsets, begins, table["size"][0])
+    return LoadedList(int(addresses[0]), addresses[table["codes"]], offsets, begins, table["parts"], table["size"][0])
 
 
 @cache

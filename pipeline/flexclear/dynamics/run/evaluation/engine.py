@@ -11,6 +11,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
+from flexclear.dynamics.compile.files import interpreted
 from flexclear.dynamics.compile.functions import function, place
 from flexclear.dynamics.compile.sources import DESCRIBED, WHOLE
 from flexclear.dynamics.effects import scheme_of
@@ -31,7 +32,9 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     call_list,
     equations,
     has_routines,
+    lists_in_python,
     made,
+    runner,
 )
 from flexclear.scene.loads import SampledPid
 from flexclear.system.errors import InputError, SolverError, refuse
@@ -170,8 +173,24 @@ class Engine:
                     self._listed(met, progress)
         self.connect()
 
+    def _connect_lists(self, progress: Progress = silent) -> None:
+        """Connect the lists, besides the steps', that compiled functions run for the selected rows."""
+        size, traits = self.model.arrays.size, self.method.traits
+        used = {m.CORRECT: size(m.N_CLOSURES), m.DISPLACE: traits.retracts, m.SPRINGS: self.method.room.oscillations}
+        rows, places = self.selected.tobytes(), [where for where, needed in used.items() if needed]
+        if INTERPRETED and not self.h[m.RUN]:
+            run = lists_in_python(self.model)
+            interpreted[id(run)] = run
+            self.h[m.RUN], self.h[places] = id(run), 2 * m.PART * np.array(places, dtype=np.int64)
+        elif not INTERPRETED:
+            self.h[m.RUN] = runner() if places else 0
+            for where in places:
+                calls = call_list(self.model, self.h, self.specialised, rows, progress, where)
+                self.h[where] = calls.words.ctypes.data
+
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row, in this thread."""
+        self._connect_lists()
         if self.has_specialised_code:
             self.h[m.DESCRIBE] = address(self.model, self.h, self.specialised, self.selected.tobytes(), DESCRIBED)
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
@@ -180,6 +199,7 @@ class Engine:
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
+        self._connect_lists()
         group, record = self.specialised.group, _record(outputs, rows, events)
         if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
             group.advance(self.entry.addresses["advance"], [*self._arrays(), *record])

@@ -7,10 +7,11 @@ those of kernels then. The topology alone decides, so that equal scenes give equ
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from flexclear.dynamics.specialise.topology import Topology, topology_of
 from flexclear.system.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from flexclear.dynamics.routines.calls import CallList
     from flexclear.dynamics.routines.store import ListInstance, LoadedList
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
@@ -53,7 +55,7 @@ class SpecialisedCode:
     place: for stepping together with others; by default each engine takes its own steps.
     group: the group at that place, for the closure rows of its code.
     addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
-    lists: of calls of routines, by closure rows, where no code is specialised.  running: these with their own results.
+    lists: of calls of routines, by closure rows and their place in h.  running: these with their own results.
     rows: those for which the present integration has specialised steps.  They belong to one integration, since other
     integrations of this engine must not change a bit of this one.
     """
@@ -62,8 +64,8 @@ class SpecialisedCode:
     place: Place | None = None
     group: LaneGroup | None = None
     addresses: dict[tuple[bytes, str], int] = field(default_factory=dict)
-    lists: dict[bytes, LoadedList] = field(default_factory=dict)
-    running: dict[bytes, ListInstance] = field(default_factory=dict)
+    lists: dict[tuple[bytes, int], LoadedList] = field(default_factory=dict)
+    running: dict[tuple[bytes, int], ListInstance] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
 
@@ -105,20 +107,59 @@ def has_routines(model: Model) -> bool:
 
 
 def call_list(
-    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
+    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent, where: int = m.CALLS
 ) -> ListInstance:
-    """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
-    from flexclear.dynamics.mechanics.of_topology import list_of  # here: they import the compiler
-    from flexclear.dynamics.routines.store import stored
+    """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows.
 
-    if rows not in code.running:
-        if rows not in code.lists:
-            parts, topology = model.parts, topology_of(model.arrays, selected(model, h, rows))
+    where: the place in h of its address, for another list (`mechanics.responses`).
+    """
+    from flexclear.dynamics.routines.store import stored  # here: it imports the compiler
+
+    def build() -> CallList:
+        from flexclear.dynamics.mechanics.of_topology import list_of
+
+        return list_of(model.parts, topology, where)
+
+    of = rows, where
+    if of not in code.running:
+        if of not in code.lists:
+            topology = topology_of(model.arrays, selected(model, h, rows))
             with _making:
-                key = repr((parts, topology)).encode()
-                code.lists[rows] = stored(key, lambda: list_of(parts, topology), partial(progress, None))
-        code.running[rows] = code.lists[rows].instance(h)
-    return code.running[rows]
+                key = repr((where, model.parts, topology)).encode()
+                code.lists[of] = stored(key, build, partial(progress, None))
+        code.running[of] = code.lists[of].instance(h)
+    return code.running[of]
+
+
+def runner() -> int:
+    """Return the address of the function that runs lists besides the steps'."""
+    from flexclear.dynamics.routines import store
+
+    return store.runner()
+
+
+def lists_in_python(model: Model) -> Callable:
+    """Return a function that runs these lists in Python; `where` in h and the part of a list are its address there."""
+    from flexclear.dynamics.mechanics.of_topology import mechanism_of
+    from flexclear.dynamics.mechanics.responses import LISTS
+    from flexclear.dynamics.mechanics.tables import Tables
+    from flexclear.dynamics.routines.numbers import Numbers
+
+    known = list[Any]()
+
+    def run(
+        h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, y: int, dy: int, address: int
+    ) -> None:
+        where, part = divmod(int(address), 2 * m.PART)
+        calls = Numbers(h, f, w, n, y, dy)
+        if part == 0:
+            known[:] = [mechanism_of(Tables(model.parts, topology_of(model.arrays, h)))]
+        with calls.building():
+            found = LISTS[where][part // m.PART](known[0], calls, *known[1:])
+        known.append(found)
+        n[m.EVALUATION] = calls.report
+
+    return run
 
 
 def selected(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
