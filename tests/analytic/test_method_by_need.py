@@ -320,7 +320,8 @@ def refused_below(least: float, run: xr.Dataset) -> xr.Dataset:
 def test_runs_are_begun_once_and_only_the_delivered_one_goes_on_beyond_the_horizon() -> None:
     """A motion whose speed errs by 300 times the tolerance, and which is another one beyond a horizon of half the run.
 
-    The error is 150 times the tolerance there: 15, 1.5 and 0.15 times the default request on the ladder's decades.
+    The error is 150 times the tolerance there: 15 and 1.5 times the default request on the ladder's first decades, from
+    which twice a tenth of the latter is expected on the next one.
     """
     runs = dict[float, InParts]()
 
@@ -337,10 +338,23 @@ def test_runs_are_begun_once_and_only_the_delivered_one_goes_on_beyond_the_horiz
     request = {"quantities": {"platform.position": {"relative": 1e-3}}}
     best = _climb(Search(load_scene(RIGID, {"time.end": 1.0, "accuracy": request}), once, predictable=True), silent)
     assert best.rtol == 1e-6
-    assert best.fraction == pytest.approx(0.15 / 1.04, rel=1e-6)  # of the range at 1e-4, 1 + 0.03 + 0.01
+    # of the range at 1e-4, 1 + 0.03 + 0.01
+    assert best.fraction == pytest.approx(2.0 * 0.15 / 1.04, rel=1e-6)
     assert {rtol: one.asked for rtol, one in runs.items()} == {
-        1e-4: [np.inf], 1e-5: [0.5], 1e-6: [0.5, np.inf], 1e-7: [0.5],
+        1e-4: [np.inf], 1e-5: [0.5], 1e-6: [0.5, np.inf],
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("last, expected", [(1.5, 2.0 * 0.1 * 1.5), (4.6, None), (0.1, 2.0 * 0.1 * 0.1)])
+def test_an_error_is_extrapolated_where_it_falls_and_meets_the_request(last: float, expected: float | None) -> None:
+    search = Search(load_scene(RIGID, {"accuracy": WANTED}), lambda scene, judges: pytest.fail("no run is needed"))
+    attempts = [Attempt(10.0**-k, {"platform.velocity": f}, f) for k, f in ((4, 15.0), (5, last))]
+    made = search.extrapolated(1e-6, attempts)
+    assert (made and made.fraction) == (expected and pytest.approx(expected))
+    assert search.extrapolated(1e-7, attempts) is None  # no neighbour
+    assert search.extrapolated(1e-6, attempts[1:]) is None
+    search.wholes[1e-6] = xr.Dataset()  # is compared up to its own, later horizon
+    assert search.extrapolated(1e-6, attempts) is None
 
 
 def test_a_run_that_none_can_be_compared_with_is_delivered_with_an_unknown_error() -> None:

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -159,6 +160,37 @@ def chatty(count: int) -> int:
     for k in range(count):
         workers.report("task", k / count, "x" * 100)
     return count
+
+
+def stopped_reason(_: int) -> str:
+    """Why a worker is to stop, once it is."""
+    end = time.monotonic() + 60.0
+    while not stopping.requested() and time.monotonic() < end:
+        time.sleep(0.01)
+    return stopping.requested()
+
+
+def test_a_stop_reaches_workers_to_which_sigterm_was_sent_and_does_not_wait_for_killed_ones() -> None:
+    """As `timeout` and services send it, to all processes of a command."""
+    with workers.team(2) as team, workers.lost():
+        futures = [team.pool.submit(stopped_reason, k) for k in range(2)]
+        busy = list(team.pool._processes)
+        while any(not future.running() for future in futures):
+            time.sleep(0.01)
+        time.sleep(3.0)  # workers import this module
+        for process in busy:
+            os.kill(process, signal.SIGTERM)
+        team.channel.request_stop("enough")
+        assert [future.result(60.0) for future in futures] == ["enough"] * 2
+    with workers.team(1) as team:
+        killed = team.pool.submit(os.getpid).result()
+        os.kill(killed, signal.SIGKILL)
+        while alive(killed):
+            time.sleep(0.01)
+        requesting = threading.Thread(target=team.channel.request_stop, args=("enough",), daemon=True)
+        requesting.start()
+        requesting.join(60.0)
+        assert not requesting.is_alive()
 
 
 def test_many_reports_arrive_in_their_order() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from flexclear.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.artifacts.schema import incomplete
@@ -22,7 +23,7 @@ class SingleRun:
         self, scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, judges: Judges | None = None
     ) -> None:
         """Build and start a scene; arguments as of `RunInParts`."""
-        self._progress = progress
+        self._progress, self._scene = progress, scene
         self._run: RunInParts | LabelledArrays
         if scene.event:
             self._run = phases.simulated(scene, bundles, progress, judges)
@@ -30,8 +31,10 @@ class SingleRun:
             self._run = RunInParts(scene, bundles, progress, judges)
 
     def until(self, time: float) -> LabelledArrays:
-        """Return the run up to a time [s] or later, without predictability horizon."""
-        return self._recorded(self._run.until(time)) if isinstance(self._run, RunInParts) else self._run
+        """Return the run up to a time [s] or later, without predictability horizon and stresses that none requests."""
+        if not isinstance(self._run, RunInParts):
+            return self._run
+        return self._recorded(replace(self._run.until(time), scene=self._scene.with_requested_output()))
 
     def whole(self) -> LabelledArrays:
         """Return the run to its end, with its horizon, and report its warnings."""

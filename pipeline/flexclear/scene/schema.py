@@ -329,6 +329,12 @@ class Scene(Part):
             return [parse(name, self.owners()) for name in self.view.watch]
         return self.requested()
 
+    def with_requested_output(self) -> Self:
+        """Return the scene without stresses and loads of flexible bodies of which no quantity is examined."""
+        asked = {term.owner.partition(".")[0] for q in (*self.requested(), *self.watched()) for term in q.terms()}
+        output = Output.model_validate(self.output.without(self.flexible().keys() - asked))
+        return self.model_copy(update={"output": output})
+
     def _hosts(self) -> dict[str, str]:
         """Return for every moving body the body that it is fixed to, or itself."""
         moving = [name for name, body in self.body.items() if not isinstance(body, Ground)]

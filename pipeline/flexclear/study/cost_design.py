@@ -162,11 +162,9 @@ def _own(scene: Scene, own: Setting) -> dict[str, Any]:
 
 def _sampling(scene: Scene, own: Setting) -> Iterator[Design]:
     """Yield the scene as it is, and with denser output, which records the stresses of no bodies but those asked for."""
-    asked = {term.owner.partition(".")[0] for q in (*scene.requested(), *scene.watched()) for term in q.terms()}
     interval, plain = scene.output.interval, {"solver": _own(scene, own), **PLAIN}
     yield Design("as it is", "sampling", {"interval": interval}, edited(scene, plain))
-    output = scene.output.without(set(scene.output.stress or ()) - asked)
-    finer = edited(scene, {**plain, "output": output | {"interval": interval / FINER_OUTPUT}})
+    finer = edited(scene.with_requested_output(), {**plain, "output.interval": interval / FINER_OUTPUT})
     yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)
 
 

@@ -1,4 +1,4 @@
-"""Worker processes of this machine: spawned, ended with their parent; Ctrl-C is left to the parent.
+"""Worker processes of this machine: spawned, ended with their parent; Ctrl-C and SIGTERM are left to the parent.
 
 `concurrent.futures` starts them and distributes the work. This module adds the request to stop in good order: without
 it each worker would lose all results since its last writing, up to `journal.WRITING_INTERVAL`.
@@ -11,8 +11,8 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from flexclear.system.errors import InputError, ResourceError
@@ -33,11 +33,13 @@ LOST = (
 class Channel:
     """Data shared by the workers of a pool and their parent: the request to stop with its reason, and progress.
 
+    ends: of a pipe, for workers without the second one; closing that one requests the stop. An event would wait for
+    workers that were killed while they waited for it.
     unstoppable: number of workers whose task cannot stop in good order. reports: arguments of `Monitor.update`; a queue
     without a process or thread of its own, whose writers wait while it is full.
     """
 
-    stop: Any
+    ends: tuple[Any, ...]
     why: Any
     unstoppable: Any
     reports: Any
@@ -46,12 +48,19 @@ class Channel:
     def made() -> Channel:
         """Create a channel for the workers of one pool."""
         context = _context()
-        return Channel(context.Event(), context.Array("c", 1000), context.Value("i", 0), context.SimpleQueue())
+        return Channel(
+            context.Pipe(duplex=False), context.Array("c", 1000), context.Value("i", 0), context.SimpleQueue()
+        )
 
     def request_stop(self, why: str) -> None:
         """Ask all workers to stop."""
         self.why.value = why.encode()[:999]
-        self.stop.set()
+        self.ends[1].close()
+
+    def await_stop(self) -> None:
+        """Wait, in a worker, until the parent asks it to stop or ends."""
+        with suppress(EOFError, OSError):
+            self.ends[0].poll(None)
 
     def count_unstoppable(self) -> None:
         """Count this worker as one whose task does not heed requests."""
@@ -83,7 +92,8 @@ def pool(width: int, channel: Channel | None = None) -> ProcessPoolExecutor:
     # imported here, because a command whose results are all up to date must start quickly
     from concurrent.futures import ProcessPoolExecutor
 
-    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(channel,))
+    given = channel and replace(channel, ends=channel.ends[:1])
+    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(given,))
 
 
 #: in a worker: the channel of its pool
@@ -91,13 +101,17 @@ _channel: Channel | None = None
 
 
 def _begin(channel: Channel | None) -> None:
-    """Prepare a worker: it ends with its parent, and ignores Ctrl-C, which the parent handles."""
+    """Prepare a worker: it ends with its parent, and ignores Ctrl-C and SIGTERM, which the parent handles.
+
+    Shells, schedulers of clusters and services send both to all processes of a command.
+    """
     global _channel
     _channel = channel
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_watch, daemon=True).start()
     if channel is not None:
-        stopping.obey(channel.stop.wait, lambda: channel.why.value.decode(errors="replace"), channel.count_unstoppable)
+        stopping.obey(channel.await_stop, lambda: channel.why.value.decode(errors="replace"), channel.count_unstoppable)
 
 
 def report(name: str, fraction: float | None, text: str) -> None:

@@ -4,7 +4,8 @@ Where the scene names no integrator, each run uses the one that is predicted to 
 
 The error of a run is estimated by the same run at the next tighter tolerance of the ladder: the error of an adaptive
 method is proportional to its tolerance, so that the difference of the two is the error less the other's known part of
-it. Each run serves as the comparison of the one before, and goes on to the end only where it is delivered.
+it. Each run serves as the comparison of the one before, and goes on to the end only where it is delivered. Where the
+errors of two neighbouring tolerances fall, the error at the next one is extrapolated instead of compared.
 Errors of the model (modes, mesh, contact law) are not part of it.
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, sec. II.4.
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
@@ -41,6 +42,8 @@ ABOVE_REQUEST = 10.0
 FINER_RUNG, SMOOTH_RUNG = 0.1, 1e-2
 #: an error that does not fall below this fraction at the next tolerance has another cause than the steps
 STUCK = 0.3
+#: an extrapolated error is this multiple of what follows from the fall before: falls differ from rung to rung
+DOUBT = 2.0
 #: default requested accuracy, as a fraction of each quantity's range; loosest and tightest tolerance of its ladder
 BY_DEFAULT, LOOSEST_RUNG, TIGHTEST_RUNG = 1e-3, 1e-4, 1e-10
 #: motions below this fraction of their natural size are rounding, which stiff rods magnify in forces
@@ -147,6 +150,21 @@ class Search:
         errors = {q.name: quantities.error(run, other, q, until) / (1.0 - self.ratio) for q in requested}
         return Attempt(rtol, errors, max((errors[q.name] / w for q, w in requested.items()), default=0.0))
 
+    def extrapolated(self, rtol: float, attempts: Sequence[Attempt]) -> Attempt | None:
+        """Return the run at a tolerance that meets the request if its errors fall as those of the last two attempts.
+
+        attempts: by tolerance, the loosest first. Return None where these are no neighbours, or errors fall too little.
+        """
+        if len(attempts) < 2 or rtol in self.wholes:
+            return None
+        before, last = attempts[-2:]
+        if (self.next_rung(before.rtol), self.next_rung(last.rtol)) != (last.rtol, rtol):
+            return None
+        fall = last.fraction / before.fraction
+        factor = DOUBT * max(fall, self.ratio)
+        expected = Attempt(rtol, {name: factor * e for name, e in last.errors.items()}, factor * last.fraction)
+        return expected if fall < STUCK and expected.met else None
+
     @property
     def sizes(self) -> xr.Dataset:
         """The run by whose sizes relative requests are judged: the tightest one that reached the end."""
@@ -232,7 +250,7 @@ def _climb(search: Search, progress: Progress) -> Attempt:
         try:
             if until < 0.0 or rtol in search.wholes:
                 until = max(until, _horizon(search, rtol))
-            now = search.rung(rtol, until)
+            now = search.extrapolated(rtol, nearest) or search.rung(rtol, until)
             if now.met and _horizon(search, rtol) > until:
                 continue  # compare up to its own horizon
         except SolverError as error:
@@ -268,7 +286,7 @@ def _delivered(search: Search, progress: Progress) -> xr.Dataset:
     if "method_reason" in run.attrs:
         progress(None, str(run.attrs["method_reason"]))
     meaning = (
-        f"largest error of the time integration, estimated by two runs with a tolerance ratio of {1.0 / search.ratio:g}"
+        f"largest error of the time integration, estimated by runs with a tolerance ratio of {1.0 / search.ratio:g}"
     )
     if search.predictable:
         meaning += f"; requested by default: {BY_DEFAULT:g} of the range, up to the predictability horizon"
