@@ -222,7 +222,8 @@ def _meaning(kind: Kind) -> str:
 PYTHON = """# Python
 
 `import flexclear as fc` brings the functions below. All but `load_scene`, `edited` and `open` bring results up to date
-first: what is fresh comes from the cache. Examples run as tests. What the datasets hold is in
+first: what is fresh comes from the cache. A `scene` (`AnyScene`) is what `load_scene` returns, a path, a name below
+`scenes/`, or a table with the keys of a scene file. Examples run as tests. What the datasets hold is in
 [datasets.md](../datasets.md), which errors there are at the end of this page.
 
 """

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from flexclear.scene import load
 from flexclear.scene.schema import Scene
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from flexclear.dynamics.stepwise import Simulation
 
 __version__ = version()
+#: what functions take as scene: a scene, its file, its name below scenes/, or a table with the keys of a scene file
+AnyScene: TypeAlias = Scene | str | Path | Mapping[str, Any]
 
 
 def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
@@ -55,7 +57,7 @@ def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, ob
     return load.scene_of(source, override) if isinstance(source, Mapping) else load.load_scene(source, override)
 
 
-def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
+def edited(scene: AnyScene, changes: Mapping[str, object]) -> Scene:
     """Return a copy of a scene with dotted paths changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a part as a table.
 
     Raises InputError.
@@ -64,7 +66,7 @@ def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
     >>> fc.edited(fc.load_scene("scenes/checks/pendulum.toml"), {"body.bob.mass": "200 g"}).body["bob"].mass
     0.2
     """
-    return load.edited(scene, changes)
+    return load.edited(_loaded(scene), changes)
 
 
 def new(source: str | Path, folder: str | Path = ".") -> Path:
@@ -78,7 +80,7 @@ def new(source: str | Path, folder: str | Path = ".") -> Path:
     return new_scene.write_from(Path(source), Path(folder))[0][0]
 
 
-def run(scene: Scene | str | Path) -> xr.Dataset:
+def run(scene: AnyScene) -> xr.Dataset:
     """Run a scene and return the dataset of the simulate stage (schema RUN), from the cache when fresh.
 
     Raises FlexclearError: InputError, SolverError or ResourceError.
@@ -91,7 +93,7 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
     return scenes.run(_loaded(scene))
 
 
-def simulation(scene: Scene | str | Path) -> Simulation:
+def simulation(scene: AnyScene) -> Simulation:
     """Begin a motion that advances in steps of your own, for controllers and forces in Python and for co-simulation.
 
     `advance(1e-3)` goes on by a duration [s], with steps as short as accuracy, contacts and events inside need; `time`
@@ -113,7 +115,7 @@ def simulation(scene: Scene | str | Path) -> Simulation:
     return begin(_loaded(scene), open_workplace())
 
 
-def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:
+def cost(scene: AnyScene, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:
     """Measure what accuracy costs: error against cost over integrators, tolerances and steps; cached point by point.
 
     The quantities are those of the scene's `[accuracy]`, else the watched ones.  budget: processor time of the runs
@@ -123,7 +125,7 @@ def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models
     return answers.dataset("cost", _loaded(scene), budget, models=models)
 
 
-def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
+def stability(scene: AnyScene, budget: str | float | None = None) -> xr.Dataset:
     """Judge whether the run of a scene is stable: value, limit, verdict and remedy over `check`.
 
     The checks: energy balance, closed loops, agreement with tighter runs and with another method, rejected and stiff
@@ -134,7 +136,7 @@ def stability(scene: Scene | str | Path, budget: str | float | None = None) -> x
 
 
 def sweep(
-    scene: Scene | str | Path,
+    scene: AnyScene,
     vary: Mapping[str, object],
     keep: Sequence[str],
     *,
@@ -169,7 +171,7 @@ def _plain(values: Any) -> Any:
     return values.tolist() if hasattr(values, "tolist") else values
 
 
-def stage(scene: Scene | str | Path, name: str) -> list[Step]:
+def stage(scene: AnyScene, name: str) -> list[Step]:
     """Run one stage alone (mesh, modes, bundle, simulate or post), on the files that the stages before it have written.
 
     Each step, one for each body where the stage has bodies, has the paths that it `reads` and `writes`, and the dataset
@@ -180,7 +182,7 @@ def stage(scene: Scene | str | Path, name: str) -> list[Step]:
     return single_stage(Graph(one, shown=scenes.as_in_its_file(one)), name, open_workplace())
 
 
-def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
+def sections(scene: AnyScene) -> tuple[xr.Dataset, xr.Dataset]:
     """Sample a periodically driven motion once in each period (schema SECTIONS), and judge it.
 
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
@@ -194,7 +196,7 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
     return recorded, verdict
 
 
-def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
+def sensitivities(scene: AnyScene, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
     """Return derivatives of quantities by numbers of a scene, through its impacts; from the cache when fresh.
 
     of: quantities over time, ``slider.position``, or reduced as in a sweep, ``pin.peak_force``,
@@ -227,7 +229,7 @@ def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def equilibrium(
-    scene: Scene | str | Path,
+    scene: AnyScene,
     time: float | None = None,
     drives: Mapping[str, float] | None = None,
     *,
@@ -250,7 +252,7 @@ def equilibrium(
 
 
 def frequencies(
-    scene: Scene | str | Path,
+    scene: AnyScene,
     time: float | None = None,
     drives: Mapping[str, float] | None = None,
     *,
@@ -272,7 +274,7 @@ def frequencies(
 
 
 def state_space(
-    scene: Scene | str | Path,
+    scene: AnyScene,
     time: float | None = None,
     drives: Mapping[str, float] | None = None,
     *,
@@ -290,7 +292,7 @@ def state_space(
     return scenes.linear(_loaded(scene), time, task="state_space", drives=drives, held=held)
 
 
-def export(scene: Scene | str | Path, format: str, target: str | Path | None = None, **options: Any) -> str:
+def export(scene: AnyScene, format: str, target: str | Path | None = None, **options: Any) -> str:
     """Write a scene for another program, as ``flexclear export`` does, and return what it prints.
 
     format: "state-space" or "loads".  target: file, by default one named like the scene in the current folder.
@@ -300,9 +302,7 @@ def export(scene: Scene | str | Path, format: str, target: str | Path | None = N
     return formats.write(_loaded(scene), format, path, options, open_workplace())
 
 
-def compare(
-    *scenes: Scene | str | Path, ideal: bool | Literal["both", "clearance", "flexibility", "each"] = False
-) -> xr.Dataset:
+def compare(*scenes: AnyScene, ideal: bool | Literal["both", "clearance", "flexibility", "each"] = False) -> xr.Dataset:
     """Compare scenes with each other, or with their ideal mechanisms: differences, errors of the runs, events and
     costs.
 
@@ -314,9 +314,7 @@ def compare(
     return comparison.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
 
 
-def effects(
-    scene: Scene | str | Path, budget: str | float | None = None, *, of: Sequence[str] | str = ()
-) -> xr.Dataset:
+def effects(scene: AnyScene, budget: str | float | None = None, *, of: Sequence[str] | str = ()) -> xr.Dataset:
     """Return the size of each effect on each quantity, removed and added, alone and in pairs.
 
     Variables and meanings: `post.answers.effect_sizes`.  The quantities are those of `[view] watch`, else of
@@ -333,7 +331,7 @@ def effects(
 
 
 def plan(
-    scene: Scene | str | Path, budget: str | float | None = None, *, accuracy: str | None = None
+    scene: AnyScene, budget: str | float | None = None, *, accuracy: str | None = None
 ) -> tuple[Scene, xr.Dataset]:
     """Plan which of a scene's effects the requested accuracy calls for: the planned scene, and the evidence.
 
@@ -347,13 +345,13 @@ def plan(
     return planning.dataset(_loaded(scene), accuracy, budget)
 
 
-def render(scene: Scene | str | Path) -> Path:
+def render(scene: AnyScene) -> Path:
     """Return the folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
     scenes.require_names(one := _loaded(scene))
     return open_workplace().made(*Graph(one).render.values(), jobs=1)[0].folder
 
 
-def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
+def show(scene: AnyScene, folder: str | Path | None = None) -> Any:
     """Return the start pose of a scene with all names, in seconds: nothing is run or compiled.
 
     folder: also write picture and page there, as ``flexclear show`` does.  In a notebook the result shows the
@@ -368,7 +366,7 @@ def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
     return start_pose.start(_loaded(scene), None if folder is None else Path(folder))
 
 
-def report(scene: Scene | str | Path, budget: str | float | None = None, *, answers: bool = True) -> Path:
+def report(scene: AnyScene, budget: str | float | None = None, *, answers: bool = True) -> Path:
     """Return the page with everything about a scene, one file, brought up to date.
 
     budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
@@ -380,16 +378,22 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
     return page.of_scene(graph, open_workplace(), budget=given, answers=answers)
 
 
-def open(scene: Scene | str | Path) -> xr.DataTree:
+def open(scene: AnyScene) -> xr.DataTree:
     """Return the stored datasets of a scene as a tree: mesh, modes, bundle by body; run, post, ensemble.
 
     `post` is left out while it is derived from another run than `run`, as after `fc.run` of a changed scene. The path
     of a dataset (``results/runs/checks/pendulum/run.nc``) gives a tree with that dataset, under the file's name.
     Nothing is run.  Raises InputError when nothing is stored, or the file is no dataset of a scene.
     """
-    return scenes.results(scene)
+    return scenes.results(scene if isinstance(scene, (str, Path)) else _loaded(scene))
 
 
-def _loaded(scene: Scene | str | Path) -> Scene:
-    """Return a scene: as given, from a file, or by its name below scenes/."""
-    return load_scene(scenes.find_scene(str(scene))) if isinstance(scene, (str, Path)) else scene
+def _loaded(scene: AnyScene) -> Scene:
+    """Return a scene: as given, from a file, by its name below scenes/, or of a table."""
+    if isinstance(scene, (str, Path)):
+        return load_scene(scenes.find_scene(str(scene)))
+    if isinstance(scene, Mapping):
+        return load_scene(scene)
+    if not isinstance(scene, Scene):
+        raise InputError("scene", f"is of type {type(scene).__name__}", "give a scene, its file or name, or a table")
+    return scene

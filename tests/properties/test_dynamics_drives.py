@@ -25,6 +25,7 @@ from flexclear.dynamics.run.run import engine_of
 from flexclear.scene.laws import Law, Spline, Step
 from tests.analytic.mechanism_runs import run
 from tests.properties.kernels import from_python
+from tests.properties.mechanisms import simulated
 
 LAWS_OF_TIME = from_python(make_laws(oscillate))
 #: eq. (35): 60 mm out and back
@@ -287,3 +288,26 @@ def test_a_cam_of_many_rows_that_rests_and_crosses_zero_is_examined_in_one_go() 
     assert process_time() - begun < 3.0
     *first, last = law.pieces[:10_001]  # in the rest
     assert jump(replace(law, pieces=(*first, replace(last, coefficients=(0.0, 1e-3)))), 0.0, 1.0) == (0.5, "rate")
+
+
+def test_knots_of_many_smooth_pieces_are_no_breaks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps end on them all the same: a spline of 602 points moves as if each were a break, with output rows only."""
+    t = np.linspace(0.0, 0.18, 602)  # not at times of output
+    law = Spline(type="spline", time=tuple(t), value=tuple(0.03 * (1.0 - np.cos(2.0 * np.pi * t / 0.18))))
+    made, end = pieces(law), len(t) - 2
+    assert set(made.last) == {end}
+    for time in (-0.01, 0.0, *t[[1, 300]], 0.1234, 0.18):
+        known = [made.value(time, order) for order in range(3)]
+        # rounding of a rate of 1 m/s
+        np.testing.assert_allclose(compiled(law, time, 0), known, rtol=1e-12, atol=1e-16)
+    kinked = Pieces((*made.pieces[:300], *(replace(p, coefficients=(0.0, 1.0)) for p in made.pieces[300:])))
+    assert set(kinked.last) >= {299, end}
+    scene = load_scene(IDEAL, {**dict.fromkeys(("drive.P1.law", "drive.P2.law"), law.model_dump()), "time.end": 0.18})
+    few = simulated(scene, {})
+    monkeypatch.setattr(drives.pieces, "FEW", 1000)
+    drives.spline.through.cache_clear()
+    many = simulated(scene, {})
+    assert len(many.time) > len(few.time) + 500
+    assert few.attrs["evaluations"] <= many.attrs["evaluations"] - 600  # none that a restart needs
+    # m: both follow the same polynomials to the tolerance
+    np.testing.assert_allclose(few.position[-1], many.position[-1], atol=1e-9)

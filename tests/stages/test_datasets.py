@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -174,6 +175,15 @@ def test_a_dataset_is_opened_by_its_path(root: Path, tmp_path: Path) -> None:
 def test_the_import_name_offers_all_functions_of_the_pipeline() -> None:
     assert set(fc.__all__) == set(dir(fc)) - {"__version__"}
     assert all(getattr(fc, name) is getattr(fc.public, name) for name in fc.__all__)
+
+
+def test_functions_take_a_table_and_refuse_what_is_no_scene() -> None:
+    table = tomllib.loads(Path("scenes/checks/oscillator.toml").read_text(encoding="utf-8"))
+    known = fc.equilibrium("scenes/checks/oscillator.toml")
+    xr.testing.assert_identical(fc.equilibrium(table).position, known.position)
+    for function in (fc.run, fc.show, fc.compare, fc.export, fc.open, fc.edited):
+        with pytest.raises(InputError, match="is of type int"):
+            function(3, *(["loads"] if function is fc.export else [{}] if function is fc.edited else []))
 
 
 PENDULUM = "scenes/checks/pendulum.toml"

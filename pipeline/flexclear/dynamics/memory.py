@@ -209,7 +209,7 @@ CLOSURE_ENVELOPE = topology("first origin")  # of the solved rows
 #: outer, inner: sites; friction: its law or -1; bristle: index of the bristles' deflection in the state or -1
 CONTACTS = topology("outer inner normal friction surfaces bristle")  # surfaces: their kind; the gauge of a stop
 LAWS = topology("piece0 n_pieces")  # the drives' laws first
-PIECE_HARMONICS = topology("harmonic0 n_harmonics")
+PIECE_HARMONICS = topology("harmonic0 n_harmonics last")  # last: see `drives.pieces.Pieces.last`
 #: a: site, -1 where the reaction acts on the world; gauge, measured: of the joint coordinate that it acts along, and of
 #: one that it measures, or -1; internal0: first of its states; follows: 1 when it turns with its frame; look0, bend0:
 #: its first of LOOKS and LOAD_BENDS; book: index in the ledger of its work, which its loss follows
@@ -375,12 +375,12 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # fmt: off
 (
     TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST,
-    SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS,
+    KNOT, SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS,
     REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, TRIED, NORM, AWAITED_TIME, RESOLVED_END, RESOLVED_STEP,
 ) = _floats(
     CONTROL,
     "time step end rtol span length drift last_norm most_growth fixed parameter rate_drift steepest "
-    "sigma past_time pass_time reach most_reach collocated fraction left blind_steps "
+    "knot sigma past_time pass_time reach most_reach collocated fraction left blind_steps "
     "rejected_step rejected_norm touched_step first tried norm awaited_time resolved_end resolved_step",
 )
 # fmt: on

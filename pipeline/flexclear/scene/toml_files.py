@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 import stat
 import tomllib
@@ -35,7 +36,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         text = path.read_text(encoding="utf-8-sig")
         if DEEP.search(text):
             raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")
-        return tomllib.loads(text)
+        return copy.deepcopy(_parsed(text))
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
     except UnicodeDecodeError as error:
@@ -48,6 +49,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), "nests tables or lists too deeply to be read") from None
     except ValueError as error:  # a NUL in the path, or a number with more digits than Python reads
         raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
+
+
+#: `check` reads a scene at several of its steps
+_parsed = lru_cache(maxsize=4)(tomllib.loads)
 
 
 def _neighbours(path: Path) -> str | None:

@@ -2,15 +2,16 @@ r"""Common form of every law of time: pieces, each a polynomial plus harmonics i
 
 .. math:: x(t) = \sum_k c_k s^k + \sum_j A_j \sin(\omega_j s + \varphi_j), \quad s = t - t_{start}
 
-so that value, rate and second rate are exact, and derivatives may jump only at the
-start of a piece, where integration restarts.
+so that value, rate and second rate are exact, and derivatives may jump only at the start of a piece, where integration
+restarts (a break) or a step ends.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import zip_longest
 from math import comb, inf, perm, pi, sin
 
@@ -22,6 +23,9 @@ from flexclear.scene.laws import COEFFICIENTS
 PACKAGE = "flexclear.dynamics.drives"
 #: times at which a piece is evaluated for its size; enough for polynomials of degree 7
 GRID = 17
+#: a law of more pieces has breaks only where value, rate or second rate jump: at others steps end, without a restart
+#: and a row of the record
+FEW = 500
 Terms = tuple[tuple[float, float, float], ...]  #: amplitude, angular frequency [rad/s], phase at the start [rad]
 
 
@@ -70,7 +74,7 @@ class Pieces:
 
     @cached_property
     def starts(self) -> list[float]:
-        """Start of each piece [s]; all but the first are breaks."""
+        """Start of each piece [s]."""
         return [p.start for p in self.pieces]
 
     @cached_property
@@ -97,6 +101,16 @@ class Pieces:
         at = owner.astype(int)
         np.add.at(values, at, a * w**order * np.sin(w * s[at] + phase + 0.5 * pi * order))
         return values
+
+    @cached_property
+    def last(self) -> np.ndarray:
+        """Index of the last piece that goes on from each one without a break."""
+        every = np.arange(len(self.pieces))
+        if len(every) <= FEW:
+            return every
+        broken = reduce(np.logical_or, (_jumps(self, every[1:], order, self.starts) for order in range(3)))
+        ends = np.append(np.flatnonzero(broken), every[-1])
+        return np.asarray(ends[np.searchsorted(ends, every)])
 
     def times(self, factor: float) -> Pieces:
         """Return the law multiplied by a factor."""
@@ -136,14 +150,20 @@ def jump(law: Pieces, start: float, end: float) -> tuple[float, str] | None:
     starts = np.array(law.starts)
     later = 1 + np.flatnonzero((start < starts[1:]) & (starts[1:] < end))
     for order, word in ((0, "value"), (1, "rate")):
-        left, right = (law.derivatives(those, starts[later], order) for those in (later - 1, later))
-        step = np.abs(right - left)
-        broken = step > 1e-6 * np.maximum(np.abs(left), np.abs(right))
-        if broken.any():  # most laws meet exactly
-            broken &= step > 1e-6 * size(law, start, end, order)
+        broken = _jumps(law, later, order, (start, end))
         if broken.any():
             return float(starts[later[np.argmax(broken)]]), word
     return None
+
+
+def _jumps(law: Pieces, later: np.ndarray, order: int, between: Sequence[float]) -> np.ndarray:
+    """Return whether a derivative jumps where each of these pieces begins, by its size between two times."""
+    left, right = (law.derivatives(those, np.array(law.starts)[later], order) for those in (later - 1, later))
+    step = np.abs(right - left)
+    broken = step > 1e-6 * np.maximum(np.abs(left), np.abs(right))
+    if broken.any():  # most laws meet exactly
+        broken &= step > 1e-6 * size(law, between[0], between[-1], order)
+    return np.asarray(broken)
 
 
 def size(law: Pieces, start: float, end: float, order: int) -> float:

@@ -5,7 +5,7 @@ Source: de Boor (1978), A Practical Guide to Splines, ch. IV and XIII (by SciPy)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,11 @@ from flexclear.scene.units import quantity
 
 def pieces(law: Spline, dimension: str) -> Pieces:
     """Return one piece between each two points."""
-    return through(law.time, [quantity(v, dimension) for v in law.value], law.degree, law.ends)
+    return through(law.time, tuple(quantity(v, dimension) for v in law.value), law.degree, law.ends)
 
 
-def through(time: Sequence[float], value: Sequence[float], degree: int, ends: Ends) -> Pieces:
+@lru_cache(maxsize=16)  # `check` asks for a law at each of its steps
+def through(time: tuple[float, ...], value: tuple[float, ...], degree: int, ends: Ends) -> Pieces:
     """Return the spline through the points; raise ValueError when periodic ends differ in value."""
     from scipy.interpolate import CubicSpline, PPoly, make_interp_spline  # here, since few laws need it
 

@@ -12,5 +12,5 @@ def pieces(law: Table, dimension: str) -> Pieces:
     """Return one piece between each two rows."""
     # "1" is the unit of bare numbers; a column that states its unit has another one
     factor = 1.0 if law.value.unit == "1" else quantity(f"1 {law.value.unit}", dimension)
-    time, value = [t for t, _ in law.points], [factor * v for _, v in law.points]
-    return through(time, value, law.degree, law.ends)
+    time, value = zip(*law.points, strict=True)
+    return through(time, tuple(factor * v for v in value), law.degree, law.ends)

@@ -11,6 +11,8 @@ from flexclear.dynamics.kernels import kernel
 
 #: of the polynomials of the laws' pieces
 DEGREE = 7
+#: times closer than this fraction of the run are the same instant, computed in two ways
+SHORTEST = 1e-12
 
 
 @kernel
@@ -23,6 +25,30 @@ def prescribe(d):
         d.du[d.nv + k] = law.second_rate
 
 
+@kernel
+def piece_at(d, k, t):
+    """Return the piece of law k at time t: where a smooth law is active from one piece on, the last that has begun."""
+    piece, last = d.active[k], d.piece_harmonics[d.active[k]].last
+    while piece < last:
+        middle = (piece + last + 1) // 2
+        if d.pieces[middle].start <= t:
+            piece = middle
+        else:
+            last = middle - 1
+    return piece
+
+
+@kernel
+def next_knot(d, t):
+    """Return the time at which a law goes on with its next piece, or the segment's end; rounding is no interval."""
+    knot, least = d.end, SHORTEST * d.span
+    for k in range(d.n_laws):
+        piece = piece_at(d, k, t + least)
+        if piece < d.piece_harmonics[piece].last and d.pieces[piece + 1].start < d.end - least:
+            knot = min(knot, d.pieces[piece + 1].start)
+    return knot
+
+
 def make_laws(harmonics: Callable = nothing) -> Callable:
     """Build the kernel laws(h, f, w, n, t); harmonics(d, k, piece, s) adds those of law k in a piece."""
 
@@ -31,7 +57,7 @@ def make_laws(harmonics: Callable = nothing) -> Callable:
         """Compute value, rate and second rate of every law, from its present piece."""
         d = data(h, f, w, n)
         for k in range(d.n_laws):
-            active = d.active[k]
+            active = piece_at(d, k, t)
             piece, law = d.pieces[active], d.law[k]
             s = t - piece.start
             x, v, a = piece.coefficients[DEGREE], 0.0, 0.0
@@ -56,7 +82,7 @@ def make_law_changes(harmonics: Callable = nothing) -> Callable:
     def law_changes(d, t, k):
         numbers = k * d.f_change
         for i in range(d.n_laws):
-            active = d.active[i]
+            active = piece_at(d, i, t)
             piece, law = d.pieces[active], d.law[i]
             begin, out = numbers + d.at_pieces + m.PIECES.size * active, k * d.w_change + d.at_law + m.LAW.size * i
             s, later = t - piece.start, -d.f[begin + m.PIECES.start]

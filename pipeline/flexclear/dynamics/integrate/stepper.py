@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.equations.prescribed_motion import next_knot
 from flexclear.dynamics.equations.projection import keep_scales, largest
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.integrate import recording
@@ -290,8 +291,9 @@ def make_advance(
         if step == 0.0:
             d.status = m.SINGULAR_AHEAD
             return 0.0
-        if t + 1.0001 * step >= d.end:
-            step = d.end - t
+        d.knot = d.end if loops and poses.ready(d) else next_knot(d, t)
+        if t + 1.0001 * step >= d.knot:
+            step = d.knot - t
         # a step below this fraction of the time reached cannot be distinguished from rounding
         if step > 4e-16 * max(abs(t), d.span):
             return step
@@ -317,8 +319,8 @@ def make_advance(
             step = d.tried
             if step == 0.0:
                 return False
-            final = t + 1.0001 * step >= d.end
-            t_new = d.end if final else t + step
+            final = t + 1.0001 * step >= d.knot
+            t_new = d.knot if final else t + step
             norm = try_step(d, step, t_new, outputs)
             if norm == PENDING:
                 return True
@@ -346,6 +348,8 @@ def make_advance(
             accept(d, t_end)
             recording.keep_largest(d, rows, t_end, d.at_y)
             plan(d, step, following)
+            if d.fixed > 0.0 and t_end == d.knot:  # without error control, slopes from before it would go unnoticed
+                begin(d)
             if loops:
                 if along:
                     poses.done(d, t_end)

@@ -107,8 +107,7 @@ class Directions:
     def given(self, one: Input, amount: float) -> Iterator[None]:
         """Change an input in the laws of time inside this context."""
         bench = self.bench
-        pieces, held = bench.model.arrays.table(m.PIECES), bench.engine.pieces
-        piece = pieces[int(held[bench.engine.segments(bench.time, after=True)][one.number])]
+        piece = bench.model.arrays.table(m.PIECES)[bench.engine.piece(one.number, bench.time)]
         kept, change = piece["coefficients"].copy(), (piece["start"] - bench.time, 1.0) if one.of_rate else (1.0, 0.0)
         piece["coefficients"][:2] += amount * np.array(change)
         try:

@@ -79,13 +79,13 @@ def _refuse_unresolved(law: Pieces, run: tuple[float, float], dimension: str, pa
 def fill(laws: Sequence[Pieces]) -> dict[Any, Any]:
     """Return the tables LAWS, PIECES, PIECE_HARMONICS and HARMONICS."""
     rows: list[tuple[int, int]] = []
-    parts: list[tuple[int, int]] = []
+    parts: list[tuple[int, int, int]] = []
     pieces = [np.zeros((0, m.PIECES.size))]
     harmonics: list[tuple[float, float, float]] = []
     for law in laws:
         rows.append((len(parts), len(law.pieces)))
         pieces.append(law.rows)
-        for piece in law.pieces:
-            parts.append((len(harmonics), len(piece.terms)))
+        for piece, last in zip(law.pieces, rows[-1][0] + law.last, strict=True):
+            parts.append((len(harmonics), len(piece.terms), last))
             harmonics += piece.terms
     return {m.LAWS: rows, m.PIECES: np.concatenate(pieces), m.PIECE_HARMONICS: parts, m.HARMONICS: harmonics}

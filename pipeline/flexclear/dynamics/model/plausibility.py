@@ -163,7 +163,9 @@ def _idle_gravity(mechanism: Mechanism) -> Iterator[tuple[str, str, str]]:
             g = np.array(load.acceleration)
             if abs(g @ normals[0]) > (1.0 - PARALLEL) * np.linalg.norm(g) > 0.0:
                 text = f"{[float(x) for x in g]} m/s^2 is along the axes of all joints, so that it moves nothing"
-                yield f"[load.{name}.acceleration]", text, "turn it into the plane of motion, or remove it"
+                loose = any(getattr(joint, "held", None) for joint in scene.joint.values())
+                tilts = "; to let loose pins tilt under it, write clearance-spherical joints" if loose else ""
+                yield f"[load.{name}.acceleration]", text, f"turn it into the plane of motion{tilts}, or remove it"
 
 
 def _missing_joints(mechanism: Mechanism) -> list[tuple[str, str, str]]:

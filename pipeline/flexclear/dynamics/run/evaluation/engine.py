@@ -15,6 +15,7 @@ from flexclear.dynamics.compile.files import interpreted
 from flexclear.dynamics.compile.functions import function, place
 from flexclear.dynamics.compile.sources import DESCRIBED, WHOLE
 from flexclear.dynamics.effects import scheme_of
+from flexclear.dynamics.equations.prescribed_motion import SHORTEST
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.integrate.method import Method
 from flexclear.dynamics.kernels import INTERPRETED
@@ -46,8 +47,6 @@ EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_fricti
 SELECTIONS = 4
 #: without steps: no output times, no rows, no events
 NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
-#: two breaks closer than this fraction of the run are the same instant, computed in two ways
-SHORTEST_SEGMENT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -79,28 +78,42 @@ class Engine:
 
     @cached_property
     def breaks(self) -> np.ndarray:
-        """Return start, breaks of drives, loads and samples, end [s]; times that differ only by rounding are merged."""
+        """Return start, jumps of laws, samples, end [s]; times that differ only by rounding are merged."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
-        for first, count in self.model.arrays.table(m.LAWS):
-            inner |= {float(t) for t in starts[first + 1 : first + count]}
+        for begun in self._begun:
+            inner |= {float(t) for t in starts[begun[1:]]}
         for period in {load.period for load in self.model.scene.load.values() if isinstance(load, SampledPid)}:
             inner |= set((self.start + period * np.arange(1, np.ceil((self.end - self.start) / period))).tolist())
-        shortest = SHORTEST_SEGMENT * (self.end - self.start)
+        shortest = SHORTEST * (self.end - self.start)
         times = [self.start]
         for t in sorted(inner):
             if t - times[-1] > shortest and self.end - t > shortest:
                 times.append(t)
         return np.array([*times, self.end])
 
+    @property
+    def _begun(self) -> list[np.ndarray]:
+        """First piece of each law and those where value, rate or second rate jump."""
+        last = self.model.arrays.table(m.PIECE_HARMONICS)["last"]
+        return [
+            np.unique([first, *(1 + last[first : first + count])])[:-1]
+            for first, count in self.model.arrays.table(m.LAWS)
+        ]
+
     @cached_property
     def pieces(self) -> np.ndarray:
-        """Piece of every law between each break and the next, shape (breaks - 1, laws)."""
-        starts, laws = self.model.arrays.table(m.PIECES)["start"], self.model.arrays.table(m.LAWS)
-        middles, indices = 0.5 * (self.breaks[:-1] + self.breaks[1:]), np.zeros((len(self.breaks) - 1, len(laws)), int)
-        for k, (first, count) in enumerate(laws):
-            passed = np.searchsorted(starts[first : first + count], middles, side="right")
-            indices[:, k] = first + np.maximum(passed - 1, 0)
-        return indices
+        """Piece with which every law goes on between each break and the next, shape (breaks - 1, laws)."""
+        starts, middles = self.model.arrays.table(m.PIECES)["start"], 0.5 * (self.breaks[:-1] + self.breaks[1:])
+        passed = [begun[np.searchsorted(starts[begun[1:]], middles, side="right")] for begun in self._begun]
+        return np.array(passed, dtype=int).reshape(len(passed), len(middles)).T
+
+    def piece(self, law: int, t: float) -> int:
+        """Return the piece of a law that holds right after `t`."""
+        first = self.pieces[self.segments(t, after=True), law]
+        last = self.model.arrays.table(m.PIECE_HARMONICS)["last"][first]
+        return int(
+            first + np.searchsorted(self.model.arrays.table(m.PIECES)["start"][first + 1 : last + 1], t, side="right")
+        )
 
     def segments(self, times: np.ndarray | float, *, after: bool) -> np.ndarray:
         """Return the segment that contains each time; on a break, the one before it, or the one `after` it."""
