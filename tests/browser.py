@@ -58,10 +58,10 @@ class Browser:
         except urllib.error.HTTPError as error:
             raise AssertionError(error.read().decode()) from None
 
-    def open(self, page: Path) -> None:
-        """Load a page from the disk, and forget what was logged before."""
+    def open(self, page: Path | str) -> None:
+        """Load a page from the disk or from an address, and forget what was logged before."""
         self.logs()
-        self.ask("POST", "/url", url=page.resolve().as_uri())
+        self.ask("POST", "/url", url=page if isinstance(page, str) else page.resolve().as_uri())
 
     def run(self, script: str, *values: Any) -> Any:
         """What a script returns."""

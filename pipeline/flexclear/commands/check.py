@@ -77,17 +77,14 @@ def command(options: argparse.Namespace) -> int:
     errors: dict[str, FlexclearError] = {}
     warnings: dict[str, InputError] = {}
     for name in options.scenes:
-        findings = examined(name, options.set)
-        if options.show:
-            refused = _show(name, options.set, quiet=options.json)
-            findings.errors += [refused] if refused is not None and not findings.errors else []
+        refused = _show(name, options.set, quiet=options.json) if options.show else None
+        findings = examined(name, options.set, refused)
         errors |= {str(mistake): mistake for mistake in findings.errors}
         warnings |= {str(warning): warning for warning in findings.warnings}
         if not findings.errors and not options.json and not options.quiet:
             print(f"{scenes.find_scene(name)}: {'; '.join(findings.notes)}; no error")
     if options.json:
-        records = [_record(mistake, "error") for mistake in errors.values()]
-        print(json.dumps([*records, *(_record(warning, "warning") for warning in warnings.values())], indent=2))
+        print(json.dumps(Findings([*errors.values()], [*warnings.values()]).records(), indent=2))
     else:
         for warning in warnings.values():
             print(f"flexclear: warning: {lines.with_line_number(warning)}", file=sys.stderr)
@@ -130,14 +127,21 @@ class Findings:
             return False
         return True
 
+    def records(self) -> list[dict[str, Any]]:
+        """Return errors and warnings as tables: severity, file, line, place, problem, remedy."""
+        found = (("error", self.errors), ("warning", self.warnings))
+        return [_record(mistake, severity) for severity, mistakes in found for mistake in mistakes]
 
-def examined(name: str, settings: Sequence[str] = ()) -> Findings:
+
+def examined(name: str, settings: Sequence[str] = (), refused: InputError | None = None) -> Findings:
     """Return all errors and warnings of a scene, sweep or recipe, and a description where it can be read.
 
-    settings: changes of the scene, ``KEY=VALUE`` as of `--set`.
+    settings: changes of the scene, ``KEY=VALUE`` as of `--set`.  refused: error of the drawn start, which counts where
+    the mechanism is too large for a check of its start.
     """
     findings = Findings()
     findings.attempt(partial(_examine, name, settings, findings))
+    findings.errors += [refused] if refused is not None and not findings.errors else []
     return findings
 
 

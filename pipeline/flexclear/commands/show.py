@@ -9,11 +9,17 @@ from flexclear.scene import lines
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
 from flexclear.stages.show import shown
+from flexclear.system.errors import InputError
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
+    parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="serve the page of one scene on this machine, with all errors of `check`, and draw again what is saved",
+    )
 
 
 def command(options: argparse.Namespace) -> int:
@@ -21,6 +27,13 @@ def command(options: argparse.Namespace) -> int:
 
     Exit code 2 where a start does not fit; it is shown all the same.
     """
+    if options.watch:
+        if len(options.scenes) > 1:
+            raise InputError("--watch", f"follows one scene, not {len(options.scenes)}", "name one")
+        from flexclear.commands.check import examined
+        from flexclear.stages import live
+
+        live.follow(options.scenes[0], options.set, examined)
     result, made = 0, dict[str, list[str]]()
     for name in options.scenes:
         scene = scenes.loaded(name, options.set)

@@ -19,6 +19,7 @@ _DOTTED = rf"{_KEY}(?:[ \t]*\.[ \t]*{_KEY})*"
 _HEADER = re.compile(rf"^[ \t]*\[\[?[ \t]*({_DOTTED})[ \t]*\]\]?[ \t]*(?:#.*)?$")
 _VALUE = re.compile(rf"^[ \t]*({_DOTTED})[ \t]*=")
 _PLACE = re.compile(r"^(?P<file>.+\.toml) \[(?P<keys>[^\[\]]+)\]$")
+_LINE = re.compile(r"^(?P<file>.+\.toml), line (?P<line>\d+)$")
 #: prefixes of a key path in files that edit another
 EDITS: tuple[tuple[str, ...], ...] = ((), ("replace",), ("set",))
 
@@ -28,7 +29,7 @@ def with_line_number(error: InputError) -> InputError:
     if isinstance(error, InputErrors):
         return InputErrors([with_line_number(one) for one in error.errors])
     position = where(error)
-    if position is None:
+    if position is None or _LINE.match(error.place):
         return error
     file, line = position
     match = _PLACE.match(error.place)
@@ -47,6 +48,8 @@ def with_file_name(error: InputError, path: Path | None) -> InputError:
 
 def where(error: InputError) -> tuple[Path, int] | None:
     """Return file and line of an error's key path, which may be written in a scene that the file extends."""
+    if found := _LINE.match(error.place):
+        return Path(found["file"]), int(found["line"])
     match = _PLACE.match(error.place)
     if match is None:
         return None

@@ -251,6 +251,25 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     return _apply_edits(compose(path.parent / table["extends"], (*above, path)), table, path)
 
 
+def files_read(path: Path) -> list[Path]:
+    """Return the file of a scene, those that it extends, and those that its parts name, as far as these can be read."""
+    files = [path]
+    with contextlib.suppress(InputError):
+        while len(files) <= LONGEST_CHAIN and isinstance(below := read_toml(files[-1]).get("extends"), str):
+            files.append(files[-1].parent / below)
+    with contextlib.suppress(InputError):
+        files += map(Path, _named_files(compose(path)))
+    return list(dict.fromkeys(files))
+
+
+def _named_files(node: Any) -> Iterator[str]:
+    if isinstance(node, dict):
+        yield from (node[key] for key in FILES if isinstance(node.get(key), str))
+        node = list(node.values())
+    for item in node if isinstance(node, list) else ():
+        yield from _named_files(item)
+
+
 def _require_tables(table: dict[str, Any], path: Path) -> None:
     """Raise InputError unless the data that is edited before validation consists of tables of tables."""
     wholes = [("", table), *((f"{edit}.", table[edit]) for edit in ("replace", "set") if edit in table)]

@@ -55,12 +55,17 @@ class Start:
 
 def start(scene: Scene, folder: Path | None = None) -> Start:
     """Return the start pose of a scene; write picture and page where a folder is given.  Raises InputError."""
-    scenes.require_names(scene)
-    with scenes.in_file(scene.path):
-        view, refused = viewed(scene)
+    view, refused = drawn(scene)
     if folder is not None:
         files_of(scene, view, folder)
     return Start(view, refused, _page(scene, view))
+
+
+def drawn(scene: Scene) -> tuple[StartView, InputError | None]:
+    """Return the start pose as `viewed` does, of a scene whose names are checked; errors say the file."""
+    scenes.require_names(scene)
+    with scenes.in_file(scene.path):
+        return viewed(scene)
 
 
 def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
@@ -101,11 +106,20 @@ def files_of(scene: Scene, view: StartView, folder: Path, *, quiet: bool = False
     return [folder / name for name in content]
 
 
-def _page(scene: Scene, view: StartView) -> bytes:
+def figure(scene: Scene, view: StartView) -> str:
+    """Return the start pose as a view to turn, a part of a page."""
     from flexclear.post.render.start_view import page_view
 
-    title = scene.title or Path(scene.name).name
-    return viewer_page(f"{title}: start", [viewer(page_view(view), title)])
+    return viewer(page_view(view), title_of(scene))
+
+
+def title_of(scene: Scene) -> str:
+    """Return the title of a scene, or the name of its file."""
+    return scene.title or Path(scene.name).name
+
+
+def _page(scene: Scene, view: StartView) -> bytes:
+    return viewer_page(f"{title_of(scene)}: start", [figure(scene, view)])
 
 
 def _body(body: Any, recipe: Path) -> xr.Dataset:

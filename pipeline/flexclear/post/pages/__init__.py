@@ -6,14 +6,14 @@ import base64
 import html
 import json
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 
 def asset(name: str) -> str:
-    """Return the text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``."""
+    """Return the text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``, ``live.js``."""
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
@@ -96,7 +96,9 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
     contents = f"<nav aria-label='Contents'><ul>{links}</ul></nav>\n" if len(shown) > 1 else ""
     top = f"<div class='answer'>{answer}</div>\n" if answer else ""
     below = f"<p class='lead'>{html.escape(lead)}</p>\n" if lead else ""
-    scripts = [asset("page.js")] + ([asset("viewer.js")] if "class='viewer'" in body else [])
+    live = "class='live'" in body
+    scripts = [asset("page.js")] + ([asset("viewer.js")] if live or "class='viewer'" in body else [])
+    scripts += [asset("live.js")] if live else []
     text = (
         "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width, initial-scale=1'><link rel='icon' href='data:,'>"
@@ -110,6 +112,31 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
 def viewer_page(title: str, views: Sequence[str], below: str = "") -> bytes:
     """Return a page with interactive views (`post.pages.viewer`), and HTML below them."""
     return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", in_columns(views) + below)])
+
+
+def live_page(title: str, views: Sequence[str], beside: str, version: int) -> bytes:
+    """Return a page that replaces its content by that of the server it came from, when that has another version."""
+    shown = f"<div class='live' data-version='{version}'><div>{''.join(views)}</div><div>{beside}</div></div>\n"
+    return page(title, "", [Part("live", "Live view", shown)])
+
+
+def findings(caption: str, records: Iterable[Mapping[str, Any]], notes: Sequence[str] = ()) -> str:
+    """Return errors and warnings of files as a list in the order of their lines, and sentences below it.
+
+    records: severity, file, line, place, problem, remedy, and the text of the line.
+    """
+    items = "".join(
+        f"<li class='{record['severity']}'><b>{html.escape(where)}</b> {html.escape(record['place'])} "
+        f"{html.escape(record['problem'])}"
+        + (f"<pre>{html.escape(record['text'])}</pre>" if record.get("text") else "")
+        + (f"<p>{html.escape(record['remedy'])}</p>" if record["remedy"] else "")
+        + "</li>\n"
+        for record in sorted(records, key=lambda one: (one["severity"], one["file"] or "", one["line"] or 0))
+        for where in [f"{record['severity']}, {Path(record['file']).name} line {record['line']}" if record["line"]
+                      else record["severity"]]
+    )  # fmt: skip
+    below = "".join(f"<p>{html.escape(note)}</p>" for note in notes)
+    return f"<figure class='findings'><figcaption>{html.escape(caption)}</figcaption><ul>{items}</ul>{below}</figure>\n"
 
 
 def in_columns(figures: Sequence[str]) -> str:

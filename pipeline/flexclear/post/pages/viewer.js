@@ -43,7 +43,7 @@
   const shown = (value) => Number(value.toPrecision(3)).toString();
 
   class Viewer {
-    constructor(root) {
+    constructor(root, before) {
       this.root = root;
       this.data = JSON.parse(root.querySelector("script").textContent);
       this.canvas = root.querySelector("canvas");
@@ -62,6 +62,7 @@
         return { ...label, text };
       });
       this.home();
+      if (before) this.resume(before);
       this.build();
       this.listen();
       this.choose(0);
@@ -70,7 +71,24 @@
       const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
       if (!still && root.dataset.play === "yes") this.play(true);
     }
-    home() { this.eye = this.data.eye.slice(); this.focus = this.data.focus.slice(); this.up = unit(this.data.up); }
+    home() {
+      this.eye = this.data.eye.slice(); this.focus = this.data.focus.slice(); this.up = unit(this.data.up);
+      this.reach = this.data.reach; this.moved = false;
+    }
+    // new content in the place of an earlier viewer: a camera that was moved stays, and what was chosen
+    resume(before) {
+      if (before.moved) for (const name of ["eye", "focus", "up", "reach", "moved"]) this[name] = before[name];
+      for (const name of ["names", "time", "factor"]) {
+        const [old, part] = [before.part(name), this.part(name)];
+        if (old && part) { part.checked = old.checked; part.value = old.value; }
+      }
+      if (this.part("time")) this.frame = this.progress = Number(this.part("time").value);
+      if (this.part("factor")) this.factor = before.factor;
+      if (before.playing) this.root.dataset.play = "yes";
+      before.playing = false;
+      const lost = before.gl.getExtension("WEBGL_lose_context"); // browsers keep few contexts
+      if (lost) lost.loseContext();
+    }
     build() {
       const gl = this.gl, program = gl.createProgram();
       for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
@@ -171,7 +189,7 @@
       const back = minus(this.eye, this.focus), far = Math.hypot(...back), z = unit(back), x = unit(cross(this.up, z)), y = cross(z, x);
       const view = [x[0], y[0], z[0], 0, x[1], y[1], z[1], 0, x[2], y[2], z[2], 0, -dot(x, this.eye), -dot(y, this.eye), -dot(z, this.eye), 1];
       // everything fits, in narrow and in wide pictures
-      const [across, upright] = this.data.reach, near = 0.02 * far, end = 6 * far;
+      const [across, upright] = this.reach, near = 0.02 * far, end = 6 * far;
       const f = 0.93 * Math.min(1 / upright, width / height / across);
       const lens = [f * height / width, 0, 0, 0, 0, f, 0, 0, 0, 0, (end + near) / (near - end), -1, 0, 0, 2 * end * near / (near - end), 0];
       gl.uniformMatrix4fv(this.in.view, false, view); gl.uniformMatrix4fv(this.in.lens, false, lens);
@@ -217,10 +235,10 @@
       const back = minus(this.eye, this.focus), side = unit(cross(this.up, back));
       const tilted = turned(back, side, upwards), lean = Math.abs(dot(unit(tilted), this.up));
       const moved = turned(lean < 0.995 ? tilted : back, this.up, across);
-      this.eye = this.focus.map((v, k) => v + moved[k]);
+      this.eye = this.focus.map((v, k) => v + moved[k]); this.moved = true;
       this.draw();
     }
-    zoom(factor) { this.eye = this.focus.map((v, k) => v + factor * (this.eye[k] - v)); this.draw(); }
+    zoom(factor) { this.eye = this.focus.map((v, k) => v + factor * (this.eye[k] - v)); this.moved = true; this.draw(); }
     choose(k) {
       this.shape = k; this.phase = 0;
       const data = this.data, bar = this.root.querySelector(".viewer-scale");
@@ -281,5 +299,6 @@
       on("factor", "input", (part) => { this.factor = 10 ** Number(part.value); this.update(); });
     }
   }
+  window.Viewer = Viewer; // for pages that replace their views
   document.querySelectorAll(".viewer").forEach((root) => new Viewer(root));
 })();
