@@ -9,10 +9,7 @@ import pytest
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.bodies.flexible import flexible_bodies
 from flexclear.dynamics.equations import articulated
-from flexclear.dynamics.equations.closures import make_closing
-from flexclear.dynamics.equations.projection import make_stiffen
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.mechanics.of_topology import program_of
@@ -100,10 +97,8 @@ def bent(name: str) -> Evaluated:
 
 
 def probed(found: Evaluated) -> list[np.ndarray]:
-    """Some forces, then what else reads the factors: L^-1 and L^-T of them, power of the drives, and the correction
-    that closes loops with the modes' stiffness next to their mass."""
-    closing, model = make_closing(articulated), found.model
-    stiffen, correction = make_stiffen(closing, articulated, flexible_bodies()), closing.correction
+    """Some forces, then what else reads the factors: L^-1 and L^-T of them, power of the drives."""
+    model = found.model
 
     @kernel
     def half(h, f, w, n):
@@ -120,17 +115,11 @@ def probed(found: Evaluated) -> list[np.ndarray]:
         d = data(h, f, w, n)
         d.last_pivot = articulated.drive_power(d, d.at_correction, d.at_u)
 
-    @kernel
-    def close(h, f, w, n):
-        d = data(h, f, w, n)
-        stiffen(d)
-        correction(d, d.at_residual, d.at_correction)
-
     w, at = found.w.copy(), int(found.h[m.CORRECTION])
     pivot, step = slice(int(found.h[m.PIVOT]), int(found.h[m.PIVOT]) + 1), slice(at, at + model.nv)
     w[step] = np.random.default_rng(3).normal(size=model.nv)
     made = [w[step].copy()]
-    for made_of, place in ((half, step), (other_half, step), (power, pivot), (close, step)):
+    for made_of, place in ((half, step), (other_half, step), (power, pivot)):
         Trace(0).plain(made_of)(found.h.tolist(), model.arrays.f, w, found.space.n)
         made.append(w[place].copy())
     return made
