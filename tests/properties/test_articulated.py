@@ -1,5 +1,6 @@
 """Articulated inertias give what the mass matrix gives, in linear time and without its loss of digits."""
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any, cast
 
@@ -8,14 +9,8 @@ import pytest
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.bodies.flexible import flexible_bodies
 from flexclear.dynamics.compile import sources
 from flexclear.dynamics.effects import Scheme
-from flexclear.dynamics.equations import articulated, composite
-from flexclear.dynamics.equations.closures import make_closing
-from flexclear.dynamics.equations.projection import make_stiffen
-from flexclear.dynamics.fields import data
-from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.mechanics.of_topology import program_of
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
@@ -28,7 +23,6 @@ from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.specialise.topology import topology_of
-from flexclear.dynamics.specialise.trace import Trace
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
@@ -152,52 +146,8 @@ def test_flexible_bodies_move_as_with_the_mass_matrix(name: str) -> None:
         assert apart(mine, theirs) < 1e-12
 
 
-def probed(found: Evaluated) -> list[np.ndarray]:
-    """What else reads the factors: L^-1 and L^-T of some forces, power of the drives, and the correction that closes
-    loops with the modes' stiffness next to their mass."""
-    tree, model = (articulated if found.model.parts.articulated else composite), found.model
-    forward, backward, drive_power, closing = tree.forward, tree.backward, tree.drive_power, make_closing(tree)
-    stiffen, correction = make_stiffen(closing, tree, flexible_bodies()), closing.correction
-
-    @kernel
-    def half(h, f, w, n):
-        d = data(h, f, w, n)
-        forward(d, d.at_correction)
-
-    @kernel
-    def other_half(h, f, w, n):
-        d = data(h, f, w, n)
-        backward(d, d.at_correction)
-
-    @kernel
-    def power(h, f, w, n):
-        d = data(h, f, w, n)
-        d.last_pivot = drive_power(d, d.at_correction, d.at_u)
-
-    @kernel
-    def close(h, f, w, n):
-        d = data(h, f, w, n)
-        stiffen(d)
-        correction(d, d.at_residual, d.at_correction)
-
-    w, made, at = found.w.copy(), list[np.ndarray](), int(found.h[m.CORRECTION])
-    pivot, step = slice(int(found.h[m.PIVOT]), int(found.h[m.PIVOT]) + 1), slice(at, at + model.nv)
-    w[step] = np.random.default_rng(3).normal(size=model.nv)
-    for made_of, place in ((half, step), (other_half, step), (power, pivot), (close, step)):
-        Trace(0).plain(made_of)(found.h.tolist(), model.arrays.f, w, found.space.n)
-        made.append(w[place].copy())
-    return made
-
-
-@pytest.mark.parametrize("name", ["branches", "driven", "held shapes", "loop", "held shapes in a loop", "driven loop"])
-def test_projection_and_exponential_steps_read_the_same(name: str) -> None:
-    for one, other in zip(*map(probed, bent(name)), strict=True):
-        assert apart(one, other) < ROUNDING
-    assert bool(np.any(other)) == ("loop" in name)  # in the end: what closes loops
-
-
-def mass_by_energy(found: Evaluated) -> np.ndarray:
-    """Mass matrix of the state's speeds by the kinetic energies of motions, which no factor has a part in."""
+def kinetic_energy(found: Evaluated) -> Callable[[np.ndarray], Any]:
+    """Kinetic energy of the speeds of all coordinates in the evaluated pose, in extended precision."""
     model, h, w = found.model, found.h, found.w.astype(np.longdouble)
     plain, u = Long(0).plain(description_kernel(model)), slice(int(h[m.U]), int(h[m.U]) + len(found.stretch(m.U)))
 
@@ -206,10 +156,15 @@ def mass_by_energy(found: Evaluated) -> np.ndarray:
         plain(h.tolist(), model.arrays.f.astype(np.longdouble), w, found.space.n)
         return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 
-    units = np.eye(len(found.stretch(m.U)))[: model.nv]
+    return energy
+
+
+def mass_by_energy(found: Evaluated) -> np.ndarray:
+    """Mass matrix of all speeds by the kinetic energies of motions, which no factor has a part in."""
+    energy, units = kinetic_energy(found), np.eye(len(found.stretch(m.U)))
     alone = [energy(unit) for unit in units]
     M = np.diag([2.0 * one for one in alone])
-    for i in range(model.nv):
+    for i in range(len(units)):
         for j in range(i):
             M[i, j] = M[j, i] = energy(units[i] + units[j]) - alone[i] - alone[j]
     return M.astype(float)
@@ -220,7 +175,8 @@ def mass_by_energy(found: Evaluated) -> np.ndarray:
 def test_flexible_bodies_have_the_mass_that_their_energy_says(name: str) -> None:
     """And accelerations of a dense solve by it, with the closures' rows."""
     one, other = bent(name)
-    M, modes, speeds = mass_by_energy(one), modes_of(one.model.arrays), one.model.speeds
+    modes, speeds, nv = modes_of(one.model.arrays), one.model.speeds, one.model.nv
+    M = mass_by_energy(one)[:nv, :nv]
     L = modes @ mass_factor(cast("Engine", one))
     assert apart(L @ L.T, M) < 1e-12  # differences of energies in extended precision
     J = selection.dense_rows(one.model, one.h, one.stretch(m.JACOBIAN)) @ modes.T
