@@ -9,9 +9,6 @@ import pytest
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.equations import articulated
-from flexclear.dynamics.fields import data
-from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.mechanics.of_topology import program_of
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
@@ -21,7 +18,6 @@ from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.specialise.topology import topology_of
-from flexclear.dynamics.specialise.trace import Trace
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.properties import tapes
@@ -94,55 +90,6 @@ def bent(name: str) -> Evaluated:
     found = evaluated(tabulated(Scene.model_validate(BENT[name])))
     assert found.report == m.OK
     return found
-
-
-def probed(found: Evaluated) -> list[np.ndarray]:
-    """Some forces, then what else reads the factors: L^-1 and L^-T of them, power of the drives."""
-    model = found.model
-
-    @kernel
-    def half(h, f, w, n):
-        d = data(h, f, w, n)
-        articulated.forward(d, d.at_correction)
-
-    @kernel
-    def other_half(h, f, w, n):
-        d = data(h, f, w, n)
-        articulated.backward(d, d.at_correction)
-
-    @kernel
-    def power(h, f, w, n):
-        d = data(h, f, w, n)
-        d.last_pivot = articulated.drive_power(d, d.at_correction, d.at_u)
-
-    w, at = found.w.copy(), int(found.h[m.CORRECTION])
-    pivot, step = slice(int(found.h[m.PIVOT]), int(found.h[m.PIVOT]) + 1), slice(at, at + model.nv)
-    w[step] = np.random.default_rng(3).normal(size=model.nv)
-    made = [w[step].copy()]
-    for made_of, place in ((half, step), (other_half, step), (power, pivot)):
-        Trace(0).plain(made_of)(found.h.tolist(), model.arrays.f, w, found.space.n)
-        made.append(w[place].copy())
-    return made
-
-
-@pytest.mark.parametrize("name", ["branches", "driven", "held shapes", "loop", "held shapes in a loop", "driven loop"])
-@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_projection_and_exponential_steps_read_the_same_factor(name: str) -> None:
-    """As dense algebra does; the drives' power by kinetic energies, like the factor."""
-    found = bent(name)
-    L, model, energy = full(found), found.model, kinetic_energy(found)
-    modes, speeds = modes_of(model.arrays), found.stretch(m.U).copy()
-    forces, half, whole, power, closed = probed(found)
-    assert apart(half, np.linalg.solve(L, forces)) < ROUNDING
-    assert apart(whole, np.linalg.solve(L.T, half)) < ROUNDING
-    speeds[: model.nv], free = 0.0, np.append(modes @ whole, np.zeros(len(found.drives)))
-    moved = energy(free)
-    assert np.sum((L.T @ whole) ** 2) == pytest.approx(float(2.0 * moved), rel=ROUNDING)
-    assert power[0] == pytest.approx(float(energy(free + speeds) - moved - energy(speeds)), rel=ROUNDING, abs=1e-30)
-    J = selection.dense_rows(model, found.h, found.stretch(m.JACOBIAN))
-    residual = found.stretch(m.RESIDUAL)[selection.selected_indices(model, found.h)]
-    assert apart(J @ closed, -residual) < ROUNDING
-    assert bool(np.any(closed)) == ("loop" in name)
 
 
 def kinetic_energy(found: Evaluated) -> Callable[[np.ndarray], Any]:

@@ -14,8 +14,6 @@ Source: Craig & Bampton (1968), AIAA Journal 6, 1313-1319 (held shapes are fixed
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import ZERO, add, scale
 
@@ -73,24 +71,6 @@ def deform(d):
                 rate += value * d.u[body.c0 + i]
                 e += 1
             d.interface_x[body.c0 + j], d.interface_u[body.c0 + j] = place, rate
-
-
-def _in_place(changed: Callable) -> Callable:
-    """Return the kernel that applies the change of basis `changed` in place, to the values of all modes in w."""
-
-    @kernel
-    def change(d, b):
-        for k in range(d.n_flex):
-            place = b + d.flexes[k].c0
-            changed(d, k, place, d.at_modal)
-            for j in range(d.flexes[k].n_modes):
-                d.w[place + j] = d.modal[j]
-
-    return change
-
-
-#: kernels (d, b) that change the values of all coordinates in w, from index b on, to the other basis of the modes
-to_interface, to_modes = _in_place(in_interface), _in_place(in_modes)
 
 
 @kernel

@@ -261,7 +261,7 @@ def _equations(parts: Parts, *, whole: bool = True) -> Composition:
 def _projection(parts: Parts) -> Composition:
     """Return a file for the projection onto the closures."""
     file = Composition(parts, "projection", "projection", (f"{DYNAMICS}.equations.projection", "make_projection"))
-    file.given = {"evaluate": "calls.evaluate", "correct": "calls.correct"}
+    file.given = {"rates": "calls.rates", "correct": "calls.correct"}
     return file
 
 

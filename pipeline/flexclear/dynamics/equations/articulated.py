@@ -355,33 +355,6 @@ def drive_forces(d):
                 d.drive_force[k - d.nv] = along(d, k, i)
 
 
-@kernel
-def drive_power(d, b, motion):
-    """Return the drives' power at accelerations in w from index b; motion: index of the rates of all coordinates."""
-    power = 0.0
-    if d.n_drives > 0:
-        transmit(d, b, 0.0)
-        for i in range(1, d.n_links):
-            link = d.links[i]
-            if link.c0 >= d.nv:
-                for k in range(link.c0, link.c0 + link.n_speeds):
-                    power += along(d, k, i) * d.w[motion + k]
-    return power
-
-
-def make_again(flexible: FlexibleBodies) -> tuple[Callable, Callable]:
-    """Build the kernels unfactor(d), which restores the modes' own mass so that more can be added, and refactor(d)."""
-    modal_mass = flexible.mass_matrix
-
-    @kernel
-    def unfactor(d):
-        for k in range(d.mass_size):
-            d.mass[k] = 0.0
-        modal_mass(d)
-
-    return unfactor, make_eliminate(flexible)
-
-
 def make_eliminate(flexible: FlexibleBodies) -> Callable:
     """Build the kernel eliminate(d): factor of the mass matrix, L^-1 of minus the bias (FORCE); True if regular."""
 

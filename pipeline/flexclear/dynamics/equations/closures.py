@@ -155,13 +155,13 @@ def independence(d):
 
 
 @kernel
-def add_spread(d, y, weight):
-    """Add weight L^-1 J^T lambda to y in w."""
+def add_spread(d, y):
+    """Add L^-1 J^T lambda to y in w."""
     for c in range(d.n_closures):
         closure = d.closures[c]
         for t in range(closure.threes):
             start = three(closure, t)
-            forces = scale(weight, at_some(d.multiplier, closure.kept0 + 3 * t, closure.n_kept - 3 * t))
+            forces = at_some(d.multiplier, closure.kept0 + 3 * t, closure.n_kept - 3 * t)
             for a in range(closure.n_support):
                 k = d.support[closure.support0 + a].coordinate
                 d.w[y + k] += dot(forces, at(d.spread, start + 3 * a))
@@ -182,12 +182,12 @@ def take_spread(d, y):
 
 
 @kernel
-def gather_rows(d, values):
-    """Copy the selected rows' values from w[values] on to the right-hand side of the multipliers."""
+def gather_rows(d):
+    """Copy the selected rows' biases to the right-hand side of the multipliers."""
     for c in range(d.n_closures):
         closure = d.closures[c]
         for k in range(closure.n_kept):
-            d.multiplier[closure.kept0 + k] = d.w[values + closure.row0 + k]
+            d.multiplier[closure.kept0 + k] = d.gamma[closure.row0 + k]
 
 
 @kernel
@@ -203,13 +203,13 @@ def respond(d):
     L^-T gives the accelerations."""
     take_spread(d, d.at_force)
     solve(d)
-    add_spread(d, d.at_force, 1.0)
+    add_spread(d, d.at_force)
 
 
 @kernel
 def finish(d):
     """Solve for the multipliers of the rows' biases and of FORCE; see `respond`."""
-    gather_rows(d, d.at_gamma)
+    gather_rows(d)
     respond(d)
 
 
@@ -252,15 +252,11 @@ def known_forces(d):
 class Closing(NamedTuple):
     """Kernels of all closures.
 
-    close(d): rows, Jacobians and multipliers, see `finish`.  complete(d): factor of J M^-1 J^T for known Jacobians;
-    needs the factor of M.  correction(d, residual, step): step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both indices in
-    w, with the factors of `complete`: the least correction of the coordinates, in the metric of M, that removes a
-    residual. known_forces(d): subtracts the closures' forces from those that the drives must supply.
+    close(d): rows, Jacobians and multipliers, see `finish`.  known_forces(d): subtracts the closures' forces from those
+    that the drives must supply.
     """
 
     close: Callable
-    complete: Callable
-    correction: Callable
     known_forces: Callable
 
 
@@ -269,28 +265,15 @@ def make_closing(tree: Any, locate: Callable = locate) -> Closing:
 
     tree: the module that factors the mass matrix.  locate: fills rows and Jacobians.
     """
-    spread, tree_backward = tree.spread, tree.backward
-
-    @kernel
-    def complete(d):
-        for c in range(d.n_closures):
-            spread(d, c)
-        couple_all(d)
+    spread = tree.spread
 
     @kernel
     def close(d):
         locate(d)
-        complete(d)
+        for c in range(d.n_closures):
+            spread(d, c)
+        couple_all(d)
         if d.evaluation == m.OK:
             finish(d)
 
-    @kernel
-    def correction(d, residual, step):
-        gather_rows(d, residual)
-        solve(d)
-        for k in range(d.nv):
-            d.w[step + k] = 0.0
-        add_spread(d, step, -1.0)
-        tree_backward(d, step)
-
-    return Closing(close, complete, correction, known_forces)
+    return Closing(close, known_forces)

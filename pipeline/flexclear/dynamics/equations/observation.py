@@ -378,6 +378,8 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
         """Close the loops of the state in Y, which has been evaluated, to `tolerance`."""
         if d.evaluation == m.OK and project(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes, tolerance) < 0:
             d.evaluation = m.NOT_CLOSED
+        elif d.abridged:
+            evaluate(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes)
         if d.evaluation == m.OK and d.n_kept_rows > 0 and d.last_pivot < BLIND:
             d.evaluation = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
         if d.evaluation == m.OK:

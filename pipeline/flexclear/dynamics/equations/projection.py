@@ -65,18 +65,18 @@ def keep_scales(d):
         d.row_scale[r] = max(d.row_scale[r], d.row_scale[d.n_closure_rows + r])
 
 
-def make_projection(evaluate: Callable, correct: Callable) -> Callable:
+def make_projection(rates: Callable, correct: Callable) -> Callable:
     """Build the kernel project(h, f, w, n, t, y, dy, tolerance).
 
-    evaluate: the right-hand side.  correct: stores changes that close the loops (`mechanics.responses`).
+    rates: the right-hand side as steps evaluate it.  correct: stores changes that close the loops (`mechanics.responses`).
     """
 
     @kernel
     def project(h, f, w, n, t, y, dy, tolerance):
         """Correct y until residuals [m] and their rates [m/s] of the selected rows are below `tolerance`.
 
-        It needs the residuals of evaluate(t, y), and leaves the work array, and dy, up to date.  It returns the number
-        of evaluations, or -1 when the loops do not close.  Very near a singular pose, where a residual says little
+        It needs the residuals of rates(d, t, y, dy), and leaves the work array, and dy, up to date.  It returns the
+        number of evaluations, or -1 when the loops do not close.  Very near a singular pose, where a residual says little
         about the error of the state, nothing changes.
         """
         d = data(h, f, w, n)
@@ -94,7 +94,7 @@ def make_projection(evaluate: Callable, correct: Callable) -> Callable:
                 return -1
             for k in range(d.nq + d.nv):
                 w[y + k] += w[dy + k]
-            evaluate(h, f, w, n, t, y, dy)
+            rates(d, t, y, dy)
             used += 1
             if d.evaluation != m.OK:
                 return -1

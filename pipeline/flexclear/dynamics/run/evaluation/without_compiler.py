@@ -61,6 +61,7 @@ def uncompiled(model: Model, mobility: Mobility) -> Engine:
 def _kernels(model: Model) -> SimpleNamespace:
     run = lists_in_python(model)
     calls = SimpleNamespace(correct=lambda *given: run(*given, 2 * m.PART * m.CORRECT))
+    calls.rates = lambda d, *given: calls.evaluate(d.h, d.f, d.w, d.n, *given)
     for name, kernel, source in sources.for_python(model.parts):
         scope: dict[str, Any] = {"calls": calls}
         exec(source, scope)
