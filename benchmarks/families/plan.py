@@ -22,14 +22,14 @@ from benchmarks.plan_scenes import Drawn, drawn
 from flexclear.artifacts import effect_size
 from flexclear.artifacts.effect_size import Agreement
 from flexclear.artifacts.points import Point
-from flexclear.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UNDECIDED, dataset, until_decided, verdict
+from flexclear.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UNDECIDED, dataset, verdict
 from flexclear.scene.load import edited
 from flexclear.scene.quantity import Quantity, parse
 from flexclear.scene.schema import Scene
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.workplace import check, open_workplace
 from flexclear.study import plan
-from flexclear.study.plan import MEMBERS
+from flexclear.study.members import MEMBERS
 from flexclear.system.errors import FlexclearError
 from flexclear.system.progress import silent
 
@@ -94,7 +94,11 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
         return time.process_time() - spent[0] + members * (full_cpu + planned_cpu) <= DECIDING
 
     pair = ((full, inputs), (planned, fewer))
-    found, members = until_decided(compared, MEMBERS if loose else (few,), affordable)
+    found, members = compared(few), few
+    for more in MEMBERS[1:] if loose else ():
+        if all(verdict(one) != UNDECIDED for one in found) or not affordable(more):
+            break
+        found, members = compared(more), more
     worst = max(found, key=lambda one: (one.missed, (one.error + one.chance) / one.allowed))
     outcome = verdict(worst)
     if outcome == MET and any(verdict(one) == MET_TO_HORIZON for one in found):

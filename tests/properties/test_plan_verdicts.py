@@ -1,5 +1,6 @@
 """Verdicts on plans: what is met, missed and not decided, before and beyond the horizon, and with how many members."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,10 +12,11 @@ from flexclear.artifacts.effect_size import POOLED, Agreement, agreement, same_s
 from flexclear.artifacts.points import Point
 from flexclear.commands.new import write
 from flexclear.dynamics.plan import search
-from flexclear.post.answers.plan import _verdict, until_decided, verdict
+from flexclear.post.answers.plan import _verdict, verdict
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import Quantity
-from flexclear.study import plan
+from flexclear.scene.schema import Scene
+from flexclear.study.members import MEMBERS, Budget, Members
 
 
 @pytest.mark.parametrize(
@@ -119,20 +121,31 @@ def test_verdicts_count_as_chance_what_differs_start_by_start_where_that_is_less
     assert (paired.error, paired.chance) == (pytest.approx(0.5), pytest.approx(0.0))
 
 
-def test_members_are_added_until_all_is_decided_as_far_as_they_are_affordable():
+def test_members_are_added_until_all_is_decided_as_far_as_they_are_affordable(monkeypatch: pytest.MonkeyPatch):
     """Chance falls with the root of the members: four leave it at four times the rest, sixteen times as many do."""
-    made = list[int]()
+    made = list[tuple[list[str], int]]()
 
-    def compared(members: int) -> list[Agreement]:
-        made.append(members)
-        return [Agreement(0.0, 4.0 * np.sqrt(4.0 / members), 1.0), Agreement(0.0, 0.1, 1.0)]
+    def points(runs: Members, chosen: dict[str, Scene], members: int) -> dict[str, Point]:
+        made.append((list(chosen), members))
+        for name, scene in chosen.items():
+            runs.budget.spent += runs._predict(name, scene, members)
+            runs.known[name] = members
+        return dict.fromkeys(chosen, Point({}, {}, {}, 1))
 
-    found, members = until_decided(compared, plan.MEMBERS, lambda members: True)
-    assert members == 64
-    assert made == [4, 64]
-    assert verdict(found[0]) == "met"
-    made.clear()
-    found, members = until_decided(compared, plan.MEMBERS, lambda members: members <= 16)
-    assert members == 16
-    assert made == [4, 16]
-    assert verdict(found[0]) == "not decided"
+    def undecided(members: int, points: Mapping[str, Point]) -> list[str]:
+        return [] if verdict(Agreement(0.0, 4.0 * np.sqrt(4.0 / members), 1.0)) == "met" else ["slow"]
+
+    monkeypatch.setattr(Members, "points", points)
+    ball = load_scene(Path(__file__).parents[2] / "scenes" / "checks" / "bounce.toml")
+    variants = dict.fromkeys(("full", "fast", "slow"), ball)
+
+    def reached(budget: float) -> dict[str, int]:
+        made.clear()
+        return Members(None, [], Budget(budget), own=1.0).until_decided(variants, MEMBERS, undecided)
+
+    assert reached(np.inf) == {"fast": 4, "slow": 64}
+    assert made == [(["full", "fast", "slow"], 4), *((["full", "slow"], n) for n in MEMBERS[1:])]
+    # runs of a second each, and 0.6 s besides: 13.8 s for four members of all, 9.2 s and 17.2 s for more of two
+    assert reached(41.0) == {"fast": 4, "slow": 16}
+    assert reached(10.0) == {"fast": 4}
+    assert reached(1e-6) == {"fast": 4}

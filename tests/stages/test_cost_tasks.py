@@ -24,6 +24,7 @@ from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, open_workplace
 from flexclear.study import cost, cost_design, members
 from flexclear.study.cost_design import Setting
+from flexclear.study.members import Budget
 from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from flexclear.workflow.fingerprint import Sources
@@ -53,7 +54,7 @@ def swing() -> Scene:
 
 @pytest.fixture(scope="module")
 def study(swing: Scene, place: Workplace) -> cost.Study:
-    found = cost.Study(swing, place, seconds=60.0)
+    found = cost.Study(swing, place, Budget(60.0))
     found.first()
     found.neighbourhood()
     return found
@@ -108,7 +109,7 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
 
 
 def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, place: Workplace, study: cost.Study):
-    small = cost.Study(swing, place, seconds=1e-3)
+    small = cost.Study(swing, place, Budget(1e-3))
     small.first()
     assert [d.key for d in small.points] == ["as it is", "dop853, rtol 1e-06"]  # one run
     assert len(small.undone) == cost_design.FIRST - 2
@@ -152,7 +153,8 @@ def test_a_file_of_peers_that_makes_no_sense_is_refused(tmp_path: Path, text: st
 def test_peers_change_the_study_but_none_of_its_points(tmp_path: Path, swing: Scene, place: Workplace):
     file = tmp_path / "peers.json"
     file.write_text(json.dumps({"checks/pendulum": [TRACK]}))
-    studies = [cost.Study(swing, place, 1e-3, peers=peers) for peers in ((), cost.read_peers(file)["checks/pendulum"])]
+    given = ((), cost.read_peers(file)["checks/pendulum"])
+    studies = [cost.Study(swing, place, Budget(1e-3), peers=peers) for peers in given]
     for one in studies:
         one.begin()
     plain, other = (one.task() for one in studies)
@@ -179,7 +181,7 @@ def test_a_method_that_used_up_its_evaluations_is_run_at_no_tighter_tolerance(
     refused = xr.Dataset(attrs={"refused": "the limit of 100000 evaluations is reached ([solver.evaluations])"})
     refused.attrs["compile_seconds"] = 1.0
     monkeypatch.setattr(Workplace, "datasets", lambda _, *tasks: [refused] * len(tasks))
-    study = cost.Study(swing, place, seconds=1e9, own=1e4, seconds_each=1e-6)
+    study = cost.Study(swing, place, Budget(1e9), own=1e4, seconds_each=1e-6)
     first, *tighter = [design for design in cost_design.wide(swing, ("radau",)) if design.group == "tolerance"]
     study._queue([first, *tighter])
     assert [design.key for design in study.points] == [first.key]

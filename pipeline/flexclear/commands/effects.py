@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from flexclear.stages import watched_quantities
 from flexclear.stages.export import as_json
 from flexclear.stages.scenes import graphs, print_files, scene_arguments
 from flexclear.stages.workplace import open_workplace, seconds
 from flexclear.study.answers import answer_of, shown_answer
 from flexclear.study.effects import bring
+from flexclear.study.members import MEMBERS
 from flexclear.system.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--members",
         type=int,
         metavar="N",
-        help=f"number of starts of each variant that has contacts (default {watched_quantities.MEMBERS}); "
+        help=f"number of starts of each variant that has contacts (default {MEMBERS[0]}); "
         "more of them resolve smaller differences; --budget chooses them itself",
     )
     parser.add_argument(
@@ -46,7 +46,7 @@ def command(options: argparse.Namespace) -> None:
     datasets: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
         if budget is None:
-            members = options.members or watched_quantities.MEMBERS
+            members = options.members or MEMBERS[0]
             name, made = "effects", bring(graph.scene, workplace, members, options.of)
         else:
             name, made = "effect_ranking", answer_of("effects", graph.scene, workplace, budget, options.of)

@@ -23,17 +23,16 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """Assemble ``cost.nc`` and its tables and figures.
 
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the scene's `own`
-    setting (own_integrator, own_rtol or own_step), in words what the budget left `undone` and what was `given_up` with
-    its method, whether the study is `complete`, and `peers`, as in `flexclear.study.cost.read_peers`. The reference
-    is the tightest run among the points; a run by another method confirms it.
+    setting (own_integrator, own_rtol or own_step), in words what the budget left `undone`, whether the study is
+    `complete`, and `peers`, as in `flexclear.study.cost.read_peers`. The reference is the tightest run among the
+    points; a run by another method confirms it.
     """
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
     chosen = [Quantity.read(data) for data in params["quantities"]]
     points = with_reference(points, runs, chosen)
     study = assemble(points, runs, chosen)
-    study.attrs |= params["own"] | {name: params[name] for name in ("undone", "given_up")}
-    study.attrs["complete"] = int(params["complete"])
+    study.attrs |= params["own"] | {"undone": params["undone"], "complete": int(params["complete"])}
     asis = next(runs[p.key] for p in points if p.key == "as it is")
     study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
     ensembles = {

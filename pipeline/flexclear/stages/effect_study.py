@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from flexclear.post.plotting.table import files
+from flexclear.post.plotting.table import Table, files
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import Effect, contacts_that_stay
 from flexclear.workflow.task import Task
@@ -35,69 +35,37 @@ class Integrated:
 
 
 def task(
-    scene: Scene,
-    effects: Sequence[Effect],
-    chosen: Sequence[Quantity],
-    variants: Mapping[Names, Scene],
-    watched: Mapping[Hashable, Sequence[Task]],
-    members: int,
-    integrated: Integrated,
-) -> Task:
-    """Return the task of all effect sizes. variants, watched: scenes and their tasks, by the effects that they lack."""
-    params = {
-        "effects": [[effect.name, effect.kind, effect.within, effect.joint] for effect in effects],
-        "variants": [sorted(gone) for gone in variants],
-        "owners": [_owners(variant) for variant in variants.values()],
-        "members": members,
-        "staying": _staying(scene, [effect.name for effect in effects]),
-    }
-    inputs = {f"variant{k}/{n}": one for k, gone in enumerate(variants) for n, one in enumerate(watched[gone])}
-    return _task("effects", scene, chosen, params, inputs, integrated)
-
-
-def ranking(
-    scene: Scene,
-    chosen: Sequence[Quantity],
-    words: Mapping[str, str],
-    variants: Mapping[str, Scene],
-    tasks: Mapping[Hashable, Sequence[Task]],
-    pairs: Mapping[str, int],
-    undone: Sequence[str],
-    integrated: Integrated,
-) -> Task:
-    """Return the task that ranks the effects, each removed alone.
-
-    words: description of each effect. variants: the scene without each effect, by its name (the full scene by the empty
-    name). tasks: their tasks by name (`stages.watched_quantities`). pairs: number of members with which each effect is
-    compared.
-    """
-    params = {
-        "words": dict(words),
-        "pairs": dict(pairs),
-        "owners": {name: _owners(made) for name, made in variants.items()},
-        "undone": ", ".join(undone),
-        "staying": _staying(scene, pairs),
-    }
-    inputs = {f"{name}/{n}": one for name in ("", *pairs) for n, one in enumerate(tasks[name])}
-    return _task("effect_ranking", scene, chosen, params, inputs, integrated)
-
-
-def _task(
     stage: str,
     scene: Scene,
     chosen: Sequence[Quantity],
-    params: Mapping[str, Any],
-    inputs: Mapping[str, Task],
+    variants: Mapping[Names, Scene],
+    watched: Mapping[Hashable, Sequence[Task]],
     integrated: Integrated,
+    **params: Any,
 ) -> Task:
-    """Return a task of this module. stage: name of the function to call and of its files."""
-    watched = {"quantities": [q.written() for q in chosen], "units": [q.unit for q in chosen]}
-    outputs = {"outputs": [scene.time.start, scene.output.interval]}
+    """Return a task of this module.
+
+    stage: name of its function, `effects` or `effect_ranking`, and of its files.  variants, watched: scenes and their
+    tasks (`stages.watched_quantities`), by the effects that they lack.  params: those of the function.
+    """
+    gone = frozenset[str]().union(*variants)
+    types = {name: joint.type for name, joint in scene.joint.items()}
+    shared = {
+        "title": scene.title,
+        "looser": integrated.looser,
+        "quantities": [q.written() for q in chosen],
+        "units": [q.unit for q in chosen],
+        "outputs": [scene.time.start, scene.output.interval],
+        "variants": [sorted(names) for names in variants],
+        "owners": [{kind: list(names) for kind, names in made.owners().items()} for made in variants.values()],
+        "staying": [name for name in contacts_that_stay(types) if f"joint.{name}" not in gone],
+    }
+    inputs = {f"variant{k}/{n}": one for k, names in enumerate(variants) for n, one in enumerate(watched[names])}
     return Task(
         stage=stage,
         scene=scene.name,
         run=f"flexclear.stages.effect_study:{stage}",
-        params={"title": scene.title, "looser": integrated.looser, **watched, **outputs, **params},
+        params=shared | params,
         inputs={**inputs, **integrated.runs},
         code=("flexclear.post",),
         folder=f"effects/{scene.name.replace('/', '_')}",
@@ -105,50 +73,89 @@ def _task(
     )
 
 
-def _staying(scene: Scene, effects: Collection[str]) -> list[str]:
-    names = contacts_that_stay({name: joint.type for name, joint in scene.joint.items()})
-    return [name for name in names if f"joint.{name}" not in effects]
-
-
-def _owners(scene: Scene) -> dict[str, list[str]]:
-    return {kind: list(names) for kind, names in scene.owners().items()}
-
-
 def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``effects.nc``, its table and its chart. params: see `task`. inputs: ``variant<k>/<n>``, as in
-    `watched_quantities`, and those of `Integrated`."""
+    """Assemble ``effects.nc``, its table and its chart: each effect alone and in pairs.
+
+    params: those of `task`; `effects` (name, kind, within, joint) and the number of `members`. inputs:
+    ``variant<k>/<n>``, as in `watched_quantities`, and those of `Integrated`.
+    """
     from flexclear.post.answers import effect_sizes
 
-    all_effects = [Effect(*text) for text in params["effects"]]
     chosen = [Quantity.read(data) for data in params["quantities"]]
-    points = {
-        frozenset(gone): _point(inputs, f"variant{k}", params["owners"][k], chosen)
-        for k, gone in enumerate(params["variants"])
-    }
+    every = [frozenset(names) for names in params["variants"]]
+    points = {gone: _point(params, inputs, gone, chosen) for gone in every}
     progress(None, "comparing")
-    times, error = _times(params["outputs"], inputs), _error_of(params, inputs)
-    dataset = effect_sizes.assemble(all_effects, chosen, points, params["members"], params["units"], times, error)
-    dataset.attrs["staying"] = effect_sizes.stay(params["staying"])
-    result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
-    return result | effect_sizes.chart("effects", dataset, f"Effect sizes: {params['title']}")
+    dataset = effect_sizes.assemble(
+        [Effect(*text) for text in params["effects"]],
+        chosen,
+        points,
+        params["members"],
+        params["units"],
+        _times(params["outputs"], inputs),
+        _error_of(params, inputs),
+    )
+    return _files("effects", dataset, effect_sizes.table, dataset, params)
+
+
+def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Assemble ``effect_ranking.nc``, table and chart: each effect removed alone.
+
+    params: those of `task`; `removed`, the effects that go with each one; `pairs`, the number of members with which
+    each one is compared; `words` of each; those `undone`, in words. inputs: as of `effects`.
+    """
+    from flexclear.post.answers import effect_ranking as ranked
+
+    chosen = [Quantity.read(data) for data in params["quantities"]]
+
+    def pair(name: str, members: int) -> ranked.Pair:
+        both = ((), params["removed"][name])
+        return ranked.Pair(*(_point(params, inputs, frozenset(gone), chosen, members) for gone in both), members)
+
+    results = ranked.assemble(
+        {name: pair(name, members) for name, members in params["pairs"].items()},
+        params["words"],
+        chosen,
+        params["units"],
+        params["undone"],
+        _times(params["outputs"], inputs),
+        _error_of(params, inputs),
+    )
+    listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
+    shown = listed.assign_coords(effect=listed["words"].values)
+    return _files("effect_ranking", results, ranked.table, shown, params)
+
+
+def _files(
+    name: str,
+    dataset: xr.Dataset,
+    table: Callable[[xr.Dataset], Table],
+    shown: xr.Dataset,
+    params: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return the files of a result. shown: the dataset of the chart."""
+    from flexclear.post.answers.effect_sizes import chart, stay
+
+    dataset.attrs["staying"] = stay(params["staying"])
+    return {"nc": dataset} | files(name, table(dataset)) | chart(name, shown, f"Effect sizes: {params['title']}")
 
 
 def _point(
+    params: Mapping[str, Any],
     inputs: Mapping[str, xr.Dataset],
-    name: str,
-    owners: Mapping[str, list[str]],
+    gone: Names,
     chosen: Sequence[Quantity],
     members: float = math.inf,
 ) -> Point:
-    """Return the point of a variant's first members, all by default, from the inputs ``<name>/<n>``."""
+    """Return the point of the first members, all by default, of the variant without some effects."""
     from flexclear.artifacts.effect_size import watched
 
+    k = [frozenset(names) for names in params["variants"]].index(gone)
     used: list[xr.Dataset] = []
     known = 0
-    while f"{name}/{len(used)}" in inputs and (known < members or not used):
-        used.append(inputs[f"{name}/{len(used)}"])
+    while f"variant{k}/{len(used)}" in inputs and (known < members or not used):
+        used.append(inputs[f"variant{k}/{len(used)}"])
         known += int(used[-1].attrs["members"])
-    return watched(used, owners, chosen)
+    return watched(used, params["owners"][k], chosen)
 
 
 def _times(outputs: Sequence[float], inputs: Mapping[str, xr.Dataset]) -> list[float]:
@@ -170,25 +177,3 @@ def _error_of(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Ca
         return float(params["looser"]) * quantities.error(own, tight, quantity, until)
 
     return error
-
-
-def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``effect_ranking.nc``, table and chart. params: see `ranking`. inputs: ``<effect>/<n>``, and
-    those of `Integrated`."""
-    from flexclear.post.answers import effect_ranking as ranked
-    from flexclear.post.answers import effect_sizes
-
-    chosen = [Quantity.read(data) for data in params["quantities"]]
-
-    def point(name: str, members: int) -> Point:
-        return _point(inputs, name, params["owners"][name], chosen, members)
-
-    pairs = {name: ranked.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
-
-    times, error = _times(params["outputs"], inputs), _error_of(params, inputs)
-    results = ranked.assemble(pairs, params["words"], chosen, params["units"], params["undone"], times, error)
-    results.attrs["staying"] = effect_sizes.stay(params["staying"])
-    result: dict[str, Any] = {"nc": results} | files("effect_ranking", ranked.table(results))
-    listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
-    shown = listed.assign_coords(effect=listed["words"].values)
-    return result | effect_sizes.chart("effect_ranking", shown, f"Effect sizes: {params['title']}")

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 #: settings of a scene that a watched run ignores
 UNSEEN = ("accuracy", "ensemble", "sections", "view")
-#: number of members of a variant with contacts
-MEMBERS = 4
 #: members that one task runs end at these numbers: a study that needs more makes only those that are missing
 BATCHES = (4, 8, 16, 32, 64)
 

@@ -21,6 +21,7 @@ from flexclear.stages import kernels, scenes, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace
 from flexclear.study import cost_design, members
+from flexclear.study.members import POINT, Budget
 from flexclear.system.errors import FlexclearError, InputError, SolverError
 from flexclear.system.external_files import require_file
 from flexclear.workflow.task import Task
@@ -38,8 +39,8 @@ Track = dict[str, Any]
 LARGEST_PEERS = 16 << 20
 #: tolerances at which the ensembles of a scene are compared
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
-#: budget of a study [s of processor time]; time of a run besides its integration, and of a new set of kernels [s]
-BUDGET, POINT, COMPILING = 80.0, 0.6, 8.0
+#: budget of a study [s of processor time]; time of a new set of kernels [s]
+BUDGET, COMPILING = 80.0, 8.0
 #: limit of a point's evaluations: so many times those of the scene's own run, or this fraction of the budget if more
 MOST_EVALUATIONS = 10.0
 #: number of skipped runs that are named
@@ -54,14 +55,14 @@ FIGURE, TITLE = "work_precision", "Error against cost"
 class Study:
     """A cost study while its points are computed, each from the cache where it exists.
 
-    seconds: processor time that the points may take; a point counts with the time of its computation.  models: True
-    when other meshes, mode sets and beam theories take part.  compiled: kernels, by what runs on them. own,
+    models: True when other meshes, mode sets and beam theories take part.  compiled: kernels, by what runs on them.
+    evaluations: those of runs, by integrator and tolerance; at least so many where they were used up.  own,
     seconds_each: evaluations of the scene's own run, and the time of each.
     """
 
     scene: Scene
     workplace: Workplace
-    seconds: float = BUDGET
+    budget: Budget
     integrators: Collection[str] = ()
     models: bool = False
     peers: Sequence[Track] = ()
@@ -69,10 +70,7 @@ class Study:
     runs: dict[str, Task] = field(default_factory=dict)
     points: list[cost_design.Design] = field(default_factory=list)
     undone: list[cost_design.Design] = field(default_factory=list)
-    spent: float = 0.0
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
-    #: loosest tolerance at which a point used up its evaluations, by integrator
-    used_up: dict[str, float] = field(default_factory=dict)
     own: float = 0.0
     seconds_each: float = 0.0
     _complete: bool = False
@@ -97,14 +95,14 @@ class Study:
         self.own = float(record.attrs["evaluations"])
         self.seconds_each = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
 
-    def first(self) -> None:
-        """Compute the first few points in the neighbourhood of the scene's own setting."""
+    def first(self, part: float = 1.0) -> None:
+        """Compute the first few points in the neighbourhood of the scene's own setting, within a part of the budget."""
         self.begin()
-        self._queue(self._neighbours[1 : cost_design.FIRST])
+        self._queue(self._neighbours[1 : cost_design.FIRST], part)
 
-    def neighbourhood(self) -> None:
-        """Compute the other points in the neighbourhood of the scene's own setting, as far as the budget goes."""
-        self._queue(self._neighbours[cost_design.FIRST :])
+    def neighbourhood(self, part: float = 1.0) -> None:
+        """Compute the other points in the neighbourhood of the scene's own setting, within a part of the budget."""
+        self._queue(self._neighbours[cost_design.FIRST :], part)
 
     def beyond(self) -> None:
         """Compute the points farther away, the cheapest first, as far as the budget goes."""
@@ -147,9 +145,8 @@ class Study:
                 "quantities": [q.written() for q in self._chosen],
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
-                "complete": self._complete and all(self._exhausted(design) for design in self.undone),
-                "undone": _listed([d.key for d in self.undone if not self._exhausted(d)]),
-                "given_up": _listed([d.key for d in self.undone if self._exhausted(d)]),
+                "complete": self._complete and not self.undone,
+                "undone": _listed([d.key for d in self.undone]),
                 "peers": list(self.peers),
             },
             inputs=inputs | self._ensembles,
@@ -170,7 +167,7 @@ class Study:
                 self.scene, {"solver.rtol": rtol, "solver.integrator": self.scene.solver.integrator, "accuracy": None}
             )
             design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
-            if self.spent + self.own * self.seconds_each * (ensemble.members if ensemble else 1) > self.seconds:
+            if not self.budget.allows(self.own * self.seconds_each * (ensemble.members if ensemble else 1)):
                 self.undone.append(design)
                 continue
             task = replace(
@@ -182,20 +179,16 @@ class Study:
             self.workplace.datasets(task)
             self._ensembles[f"ensemble:rtol {rtol:g}"] = task
 
-    def _queue(self, designs: Sequence[cost_design.Design]) -> None:
-        """Compute points in this order; skip those that the budget no longer allows."""
+    def _queue(self, designs: Sequence[cost_design.Design], part: float = 1.0) -> None:
+        """Compute points in this order; skip those that a part of the budget or the limit of a point does not allow."""
         for design in (one for one in designs if one.key not in self.runs):
-            seconds = design.evaluations(self.evaluations, self.own) * self.seconds_each + POINT
+            evaluations = design.evaluations(self.evaluations, self.own)
             compiling = COMPILING if kernels.shared(design.scene) not in self.compiled else 0.0
-            if self.spent + seconds + compiling > self.seconds or self._exhausted(design):
+            allowed = self.budget.allows(evaluations * self.seconds_each + POINT + compiling, part)
+            if not allowed or (design.chooses_steps and evaluations > self._evaluation_limit()):
                 self.undone.append(design)
             else:
                 self._made(design)
-
-    def _exhausted(self, design: cost_design.Design) -> bool:
-        """Return True when the design's method used up its evaluations at the same or a looser tolerance."""
-        solver = design.scene.solver
-        return design.chooses_steps and solver.rtol <= self.used_up.get(solver.integrator, 0.0)
 
     def _made(self, design: cost_design.Design) -> xr.Dataset:
         """Return one point, brought up to date."""
@@ -210,27 +203,24 @@ class Study:
         first, compiled = kernels.shared(design.scene) not in self.compiled, self._kernels(design)
         task = members.point(design, members.names_of(self.scene), compiled, run)
         record, *kernel = self.workplace.datasets(*([task, compiled] if first else [task]))
-        self.spent += sum(float(one.attrs["compile_seconds"]) for one in kernel)
         self.runs[design.key] = task
         self.points.append(design)
-        solver = design.scene.solver
-        if "evaluations" in record.attrs.get("refused", ""):
-            self.spent += POINT + self._evaluation_limit() * self.seconds_each
-            if design.chooses_steps:
-                self.used_up[solver.integrator] = max(solver.rtol, self.used_up.get(solver.integrator, 0.0))
-        elif "refused" in record.attrs:
-            self.spent += POINT
-        else:
-            self.spent += POINT + float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
-            if design.chooses_steps:
-                known = self.evaluations.setdefault(solver.integrator, {})
-                known[solver.rtol] = float(record.attrs["evaluations"])
+        solver, limited = design.scene.solver, "evaluations" in record.attrs.get("refused", "")
+        spent = POINT + sum(float(one.attrs["compile_seconds"]) for one in kernel)
+        if limited:
+            spent += self._evaluation_limit() * self.seconds_each
+        elif "refused" not in record.attrs:
+            spent += float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
+        if design.chooses_steps and (limited or "refused" not in record.attrs):
+            used = self._evaluation_limit() if limited else float(record.attrs["evaluations"])
+            self.evaluations.setdefault(solver.integrator, {})[solver.rtol] = used
+        self.budget.spent += spent
         return record
 
     def _evaluation_limit(self) -> int:
         """Return the evaluations that a point may take: 1, 2 or 5 times a power of ten, so that keys rarely change with
         budgets."""
-        affordable = max(MOST_EVALUATIONS * self.own, self.seconds / self.seconds_each / MOST_EVALUATIONS, 1e5)
+        affordable = max(MOST_EVALUATIONS * self.own, self.budget.seconds / self.seconds_each / MOST_EVALUATIONS, 1e5)
         below = 10 ** math.floor(math.log10(affordable))
         return next(factor * below for factor in (1, 2, 5, 10) if factor * below >= affordable)
 
@@ -257,7 +247,7 @@ def bring(
     the first answer. Raises InputError for a scene without quantities to measure.  Interrupted work leaves the answer
     so far.
     """
-    study = Study(scene, workplace, budget, integrators, models, peers)
+    study = Study(scene, workplace, Budget(budget), integrators, models, peers)
     study.first()
     answered(study.drawn())
     try:

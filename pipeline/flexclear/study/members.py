@@ -1,12 +1,14 @@
 """Variants of a scene x members -> the points of their watched quantities: each variant, member and tolerance run once.
 
-`effects`, the answer on effects and `plan --verify` use these points. All variants run by the method and at the
-tolerance of the scene's own run, which says those that the scene leaves open.
+`effects`, the answer on effects and `plan --verify` are strategies upon these points: which variants, until when. All
+variants run by the method and at the tolerance of the scene's own run, which says those that the scene leaves open.
+One `Budget` counts the runs of a study, those of its costs as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -27,6 +29,10 @@ if TYPE_CHECKING:
 
 #: name of a variant
 Name = TypeVar("Name", bound=Hashable)
+#: numbers of members that are tried until a comparison is decided
+MEMBERS = (4, 8, 16, 32, 64)
+#: processor time of a run besides its integration [s]
+POINT = 0.6
 #: tightest tolerance of members with contacts: their starts differ by a thousandth of the clearance, which is more than
 #: this tolerance of the mechanism's size
 MEANS = 1e-6
@@ -35,17 +41,67 @@ TIGHTER_EVALUATIONS, FEWEST_EVALUATIONS = 4, 100_000
 
 
 @dataclass
+class Budget:
+    """Processor time that runs may take, and have taken [s]; stored ones count as when they were made."""
+
+    seconds: float = math.inf
+    spent: float = 0.0
+
+    def allows(self, seconds: float, part: float = 1.0) -> bool:
+        """Return True when runs of this time [s] fit into what is left of a part of the budget."""
+        return self.spent + seconds <= part * self.seconds
+
+
+@dataclass
 class Members:
     """Members of variants that have run.
 
-    chosen: the watched quantities. tasks: by variant, one for each batch of members. seconds: processor time of a run
-    of each variant, and of compiling in its last batch [s].
+    chosen: the watched quantities. own: processor time of the scene's own run [s], which predicts the first ones.
+    tasks: by variant, one for each batch of members. seconds: processor time of a run of each variant [s]. known:
+    number of members of each variant. refused: True once the solver refused a variant.
     """
 
     workplace: Workplace
     chosen: Sequence[Quantity]
+    budget: Budget = field(default_factory=Budget)
+    own: float = 0.0
     tasks: dict[Hashable, list[Task]] = field(default_factory=dict)
-    seconds: dict[Hashable, tuple[float, float]] = field(default_factory=dict)
+    seconds: dict[Hashable, float] = field(default_factory=dict)
+    known: dict[Hashable, int] = field(default_factory=dict)
+    refused: bool = False
+
+    def until_decided(
+        self,
+        variants: Mapping[Name, Scene],
+        levels: Sequence[int],
+        undecided: Callable[[int, Mapping[Name, Point]], Collection[Name]],
+    ) -> dict[Name, int]:
+        """Compare variants with the first one, over more members until each is decided or the budget is spent.
+
+        levels: rising numbers of members.  undecided: returns the variants that need more, from their number and
+        points.  Return the number of members of each variant that has run, at least of one.
+        """
+        full, *waiting = variants
+        reached = dict[Name, int]()
+        for members in levels:
+            rest = self.budget.seconds - self.budget.spent - self._predict(full, variants[full], members)
+            chosen = list[Name]()
+            for name in waiting:
+                rest -= self._predict(name, variants[name], members)
+                if rest >= 0.0 or not (reached or chosen):
+                    chosen.append(name)
+            if not chosen:
+                break
+            points = self.points({name: variants[name] for name in (full, *chosen)}, members)
+            reached |= dict.fromkeys(chosen, members)
+            more = undecided(members, points)
+            waiting = [name for name in chosen if name in more]
+        return reached
+
+    def _predict(self, name: Hashable, scene: Scene, members: int) -> float:
+        """Return the predicted processor time of the members of a variant that have not run [s]."""
+        runs = members - self.known.get(name, 0) if scene.contacts() or scene.stop else 1
+        return runs * self.seconds.get(name, self.own) + POINT
 
     def points(self, variants: Mapping[Name, Scene], members: int) -> dict[Name, Point]:
         """Return the points of variants over this number of members; of one run where a variant has no contacts."""
@@ -59,8 +115,11 @@ class Members:
             stored = [batch.dataset() for batch in batches]
             last = stored[-1].attrs
             self.tasks[name] = [batch.task for batch in batches]
-            self.seconds[name] = float(last["cpu_seconds"]) / float(last["members"]), float(last["compile_seconds"])
+            self.seconds[name] = float(last["cpu_seconds"]) / float(last["members"])
+            self.budget.spent += self._predict(name, variants[name], members) + float(last["compile_seconds"])
+            self.known[name] = members
             points[name] = watched(stored, variants[name].owners(), self.chosen)
+            self.refused = self.refused or bool(points[name].refused)
         return points
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import time
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,18 +17,19 @@ from flexclear.scene.units import quantity as number
 from flexclear.scene.variants import without_parts
 from flexclear.stages import effect_plan, scenes
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
-from flexclear.study.members import Members
+from flexclear.study.members import MEMBERS, Budget, Members
 from flexclear.system.errors import InputError, SolverError
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.artifacts.points import Point
     from flexclear.scene.schema import Scene
 
 #: ending of a planned scene's file, after the scene's name
 SUFFIX = ".planned.toml"
-#: members that `--verify` runs of scenes with contacts, up to a verdict or to the budget [s]
-MEMBERS, BUDGET = (4, 8, 16, 32, 64), 60.0
+#: budget of `--verify` [s]
+BUDGET = 60.0
 #: accuracies that are planned for a scene without `[accuracy]`, as fractions of each watched quantity's size
 LEVELS = ("10 %", "1 %", "0.1 %")
 #: that of `fc.plan`
@@ -198,7 +199,7 @@ def page(planned: Planned) -> bytes:
 def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> list[str]:
     """Run the full and the planned scene, print their differences, and return a sentence for each missed accuracy.
 
-    budget: time for members that decide the verdicts [s].
+    budget: processor time for members that decide the verdicts [s].
     """
     from flexclear.post.answers.plan import agreement_of, verified
 
@@ -218,21 +219,19 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
 def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
     """Return the distance of the planned run from the full one by quantity, over members where the scene has contacts.
 
-    Members are added until every verdict is decided, as far as the budget [s] allows.
+    Members are added until every verdict is decided, as far as the budget of processor time [s] allows.
     """
     from flexclear.artifacts import effect_size
-    from flexclear.post.answers.plan import until_decided
+    from flexclear.post.answers.plan import UNDECIDED, verdict
 
     assert planned.scene.accuracy is not None
-    asked, begun = planned.scene.accuracy.quantities, time.monotonic()
-    full = edited(planned.scene, {"accuracy": None})
-    result, first = planned.made.dataset()[["requested"]].copy(), list[float]()
+    asked, full = planned.scene.accuracy.quantities, edited(planned.scene, {"accuracy": None})
+    result, verdicts = planned.made.dataset()[["requested"]].copy(), list[effect_size.Agreement]()
     chosen = [parse(str(name), planned.scene.owners()) for name in result["quantity"].values]
 
-    def compared(members: int) -> list[effect_size.Agreement]:
-        both = full, planned.planned
-        one, two = Members(workplace, chosen).points(dict(enumerate(both)), members).values()
-        for point, what in ((one, "full"), (two, "planned")):
+    def undecided(members: int, points: Mapping[str, Point]) -> Collection[str]:
+        one, two = points["full"], points["planned"]
+        for what, point in points.items():
             if point.refused:
                 raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")
         for k, q in enumerate(chosen):
@@ -241,15 +240,14 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
                 result["requested"][k] = relative * effect_size.size(one, q)
         result["scatter"] = (("quantity",), [effect_size.scatter(one, q) for q in chosen])
         result.attrs |= {"full_evaluations": one.evaluations, "planned_evaluations": two.evaluations}
-        first.append(time.monotonic() - begun)
-        requested = result["requested"].values
-        return [effect_size.agreement(two, one, q, members, float(r)) for q, r in zip(chosen, requested, strict=True)]
-
-    def affordable(members: int) -> bool:
-        return time.monotonic() - begun + first[0] * members / MEMBERS[0] <= budget
+        requested = map(float, result["requested"].values)
+        verdicts[:] = [effect_size.agreement(two, one, q, members, r) for q, r in zip(chosen, requested, strict=True)]
+        return points if any(verdict(one) == UNDECIDED for one in verdicts) else ()
 
     loose = planned.scene.contacts() or planned.scene.stop
-    verdicts, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
+    runs = Members(workplace, chosen, Budget(budget))
+    both = {"full": full, "planned": planned.planned}
+    members = runs.until_decided(both, MEMBERS if loose else MEMBERS[:1], undecided)["planned"]
     for name in ("error", "chance", "allowed", "horizon"):
         result[name] = (("quantity",), [getattr(one, name) for one in verdicts])
     return result.assign_attrs(members=members if loose else 0)

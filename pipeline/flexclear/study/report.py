@@ -121,13 +121,10 @@ def _answers(answers: Answers, workplace: Workplace) -> tuple[dict[str, Made], d
     result, failed = dict[str, Made](), dict[str, int]()
     for name in ("accuracy", "stability", "effects") if answers.questions else ("stability",):
         try:
-            answer = getattr(answers, name)
+            result[name] = getattr(answers, name)
         except FlexclearError as error:
             workplace.monitor.say(f"not in the report: {name}: {error}")
             failed[name] = error.exit_code
-            continue
-        if answer is not None:
-            result[name] = answer
     return result, failed
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -192,24 +192,6 @@ def verdict(one: Agreement) -> str:
     if one.met:
         return MET if one.horizon == 1.0 else MET_TO_HORIZON
     return MISSED if one.missed else UNDECIDED
-
-
-def until_decided(
-    compared: Callable[[int], list[Agreement]], levels: Sequence[int], affordable: Callable[[int], bool]
-) -> tuple[list[Agreement], int]:
-    """Return agreements over the members that decide all of them, and that number of members.
-
-    compared: computes them for a number of members.  levels: rising numbers of members.  affordable: the budget's
-    limit.
-    """
-    members = levels[0]
-    while True:
-        found = compared(members)
-        needed = max((one.enough(members) for one in found if verdict(one) == UNDECIDED), default=0.0)
-        more = [n for n in levels if n > members and affordable(n)]
-        if not needed or not more:
-            return found, members
-        members = next((n for n in more if n >= needed), more[-1])
 
 
 def verified(planned: xr.Dataset) -> Table:

@@ -89,12 +89,8 @@ def _remedy(study: xr.Dataset, cause: str) -> str:
 
 
 def undone(study: xr.Dataset) -> list[str]:
-    """Return a sentence for each reason why runs were skipped."""
-    reasons = {
-        "undone": "Not run within the budget",
-        "given_up": "Not run, since their method reached the limit of evaluations at the same or a looser tolerance",
-    }
-    return [f"{text}: {study.attrs[name]}." for name, text in reasons.items() if study.attrs.get(name)]
+    """Return a sentence on runs that were skipped, if any."""
+    return [f"Not run within the budget: {study.attrs['undone']}."] if study.attrs.get("undone") else []
 
 
 INTRODUCTION = """# What accuracy costs
