@@ -33,7 +33,7 @@ def test_an_undecided_verdict_says_how_far_single_runs_scatter():
     compared = xr.Dataset({k: ("quantity", v) for k, v in one.items()}, coordinates, {"members": 4})
     said = _verdict(compared, 0)
     # four times as many halve the chance: half of what is allowed is left for it, a tenth of it
-    beyond = "beyond 25% of the time single runs of the full scene scatter by 2 m"
+    beyond = "after 25% of the time runs of the full scene from slightly different starts differ by 2 m"
     assert said == f"not decided: {beyond}; 400 members would decide"
     assert _verdict(compared.assign(horizon=("quantity", [1.0])), 0) == "not decided: 400 members would decide"
     assert _verdict(compared.assign(error=("quantity", [8.0])), 0) == "missed, 8 times the allowed error"

@@ -6,8 +6,9 @@ import xarray as xr
 
 import flexclear as fc
 from flexclear.post.overview import sweep_figures
-from flexclear.post.overview.curves import NOISE, impacts, noise, without_noise
+from flexclear.post.overview.curves import NOISE, format_to_digits, impacts, noise, without_noise
 from flexclear.post.plotting import style
+from flexclear.post.render import start_view
 from flexclear.post.render.layout import CLEARANCE_COLOR
 from flexclear.post.render.mechanism import SOCKET
 from flexclear.post.render.ruler import exaggeration
@@ -43,7 +44,21 @@ def test_the_factor_of_a_clearance_is_what_is_drawn(root):
     scene = fc.load_scene(root / LOOSE[0][0])
     ((_, joint),) = scene.contacts().items()
     factor = (SOCKET - 1.0) * joint.pin_radius / joint.clearance
-    assert f"clearances drawn {factor:.2g} times larger" in exaggeration(fc.show(scene).view.drawn)
+    assert f"clearances drawn {format_to_digits(factor, 2)} times larger" in exaggeration(fc.show(scene).view.drawn)
+
+
+@pytest.mark.parametrize("letter", "iW")
+def test_long_names_of_a_start_end_before_the_edge(letter: str):
+    axes = style.canvas(start_view.SIZE).figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(0, start_view.SIZE[0]), ylim=(start_view.SIZE[1], 0))
+    marks = [start_view.Mark(letter * n, letter * 2 * n, np.zeros(3), "k") for n in (3, 200)]
+    start_view._columns(axes, marks * 2, np.array([[x, 300.0 + x] for x in (400, 500, 1200, 1300)]))
+    assert len(axes.texts) == 8
+    for text in axes.texts:
+        box = text.get_window_extent()
+        assert box.x0 > 0.0
+        assert box.x1 < start_view.SIZE[0]
+        assert text.get_text().endswith("…") == (text.get_text().count(letter) > 10)
 
 
 def test_a_zero_line_has_no_range_of_its_own():

@@ -3,11 +3,15 @@
 import io
 import logging
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from flexclear.system.errors import InputError
 from flexclear.system.log import LOG, set_level, write_to
+from flexclear.workflow import schedule
 from flexclear.workflow.progress import Monitor, duration
+from flexclear.workflow.task import Task
 
 
 class Screen(io.StringIO):
@@ -48,6 +52,25 @@ def test_lines_that_stay_are_sparse():
     assert lines[0] == "flexclear: [0/2] sps4/csj: simulate"
     assert lines[-1] == "flexclear: [1/2] sps4/csj: simulate done after 29.7 s"
     assert len(lines) == 4  # 30 s, one line every 10 s
+
+
+def test_what_each_run_of_a_search_says_is_said_once():
+    monitor, screen, clock = watched(terminal=False)
+    name = monitor.begin("watt", "simulate")
+    for _ in range(3):
+        monitor.update(name, None, "10 free motions")
+        monitor.update(name, None, "warning: 3 ways")
+        clock.now += 1.0
+    lines = screen.getvalue().splitlines()
+    assert [line.rpartition("simulate ")[2] for line in lines[1:]] == ["10 free motions", "warning: 3 ways"]
+
+
+def test_a_mistake_in_a_recipe_is_located_in_it(tmp_path: Path):
+    recipe = tmp_path / "rod.toml"
+    recipe.write_text('[frames.foot]\non = { region = "strat" }\n', encoding="utf-8")
+    error = InputError(f"{recipe} [frames.foot.on.region]", "no region is called 'strat'")
+    failure = schedule._failure(Task("mesh", "rod", "", {}, ""), error)
+    assert f"{recipe} [frames.foot.on.region], line 2: no region" in failure.message
 
 
 def test_the_rest_is_estimated_from_the_pace_without_compiling():

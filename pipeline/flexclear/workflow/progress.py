@@ -37,6 +37,7 @@ class Job:
     fraction: float | None = None
     text: str = ""
     last_line: float = 0.0  #: time of the last permanent line
+    told: set[str] = field(default_factory=set)  #: texts without a fraction; each run of a search repeats them
 
 
 @dataclass
@@ -91,8 +92,9 @@ class Monitor:
         job = self.jobs.get(name)
         if job is None:
             return
-        news = fraction is None and text != job.text
-        if text.startswith(WARNING) and (self.rewrites or self.quiet):
+        news = fraction is None and text not in job.told
+        job.told |= {text} if news else set()
+        if news and text.startswith(WARNING) and (self.rewrites or self.quiet):
             self.say(f"{job.name}: {text}")  # a permanent line, since the line of progress is rewritten or absent
         # work without a fraction (compiling, waiting) does not enter the estimate of the remaining time
         if fraction is None or job.since is None or fraction < job.since[1]:  # restarted, e.g. at another tolerance

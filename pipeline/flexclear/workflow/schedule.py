@@ -326,10 +326,11 @@ def attempt(
 
 
 def _failure(task: Task, error: FlexclearError) -> Failure:
-    """Return the failure of a task by an expected error; input errors of a scene with a file are located in it."""
-    if isinstance(error, InputError) and task.context.get(PATH):
-        error = lines.with_line_number(lines.with_file_name(error, Path(task.context[PATH])))
-        if all(str(task.context[PATH]) in one.place for one in errors_of(error)):
+    """Return the failure of a task by an expected error; input errors are located in their file, if any."""
+    if isinstance(error, InputError):
+        path = task.context.get(PATH)
+        error = lines.with_line_number(lines.with_file_name(error, Path(path) if path else None))
+        if path and all(str(path) in one.place for one in errors_of(error)):
             return Failure(task, error.exit_code, str(error))
     return Failure(task, error.exit_code, f"{task.scene} {task.label}: {error}")
 

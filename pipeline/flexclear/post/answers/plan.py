@@ -225,7 +225,7 @@ def _verdict(planned: xr.Dataset, k: int) -> str:
         return f"missed, {one.error / one.allowed:.2g} times the allowed error" if one.allowed else result
     if one.horizon < 1.0:
         reasons.append(
-            f"beyond {one.horizon:.0%} of the time single runs of the full scene scatter by "
+            f"after {one.horizon:.0%} of the time runs of the full scene from slightly different starts differ by "
             f"{written(float(planned['scatter'][k]), 0.0, unit)}"
             + (", and the means differ by less" if result == MET_TO_HORIZON else "")
         )

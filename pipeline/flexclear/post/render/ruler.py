@@ -51,7 +51,7 @@ def exaggeration(drawn: Mechanism) -> list[str]:
         if joint.get("clearance") and radius:
             factors.append((SOCKET - 1.0) * float(radius) / float(joint["clearance"]))
     if factors:
-        low, high = (f"{value:.2g}" for value in (min(factors), max(factors)))
+        low, high = (format_to_digits(value, 2) for value in (min(factors), max(factors)))
         texts.append(f"clearances drawn {low if low == high else f'{low} to {high}'} times larger")
     return texts
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -267,8 +268,8 @@ def _notes(drawn: mechanism.Mechanism, parameters: Mapping[str, Any], gaps: Sequ
 SIZE, MARGIN = (1600, 1000), 330
 #: heights of lines of names [pixels], with details below and without; begin and end of the columns
 LINES, TOP, BOTTOM = (33.0, 17.0), 70.0, 90.0
-#: letters of a detail that fit in a column
-LETTERS = 56
+#: pixels between a text and the picture's edge
+EDGE = 12
 
 
 def picture(start: StartView, title: str) -> np.ndarray:
@@ -283,10 +284,11 @@ def picture(start: StartView, title: str) -> np.ndarray:
     with style.style():
         points = project(start.drawn, np.array([mark.point for mark in start.marks]).reshape(-1, 3), SIZE, MARGIN)
         shown = _columns(axes, start.marks, points)
-        axes.text(20, 26, title, fontsize=13, fontweight="bold", color=style.INK, va="center", parse_math=False)
+        write = partial(_write, axes, SIZE[0] - 2 * 20)
+        write(20, 26, title, fontsize=13, fontweight="bold", color=style.INK)
         left_out = [] if shown == len(start.marks) else [f"{shown} of {len(start.marks)} names; the page has all"]
         notes = " · ".join([*start.notes, *left_out])
-        axes.text(20, 49, notes, fontsize=9.5, color=style.SOFT, va="center", parse_math=False)
+        write(20, 49, notes, fontsize=9.5, color=style.SOFT)
         _directions(axes, start.drawn, start.gravity)
         ruler(axes, start.drawn, SIZE, MARGIN)
     axes.set(xlim=(0, width), ylim=(height, 0))
@@ -322,12 +324,19 @@ def _columns(axes: style.Axes, marks: Sequence[Mark], points: np.ndarray) -> int
             align = "left" if right else "right"
             axes.plot([x + (-5 if right else 5), points[k, 0]], [y, points[k, 1]], color=mark.color, lw=0.7, alpha=0.6)
             axes.plot(*points[k], "o", ms=3.5, color=mark.color)
-            axes.text(x, y, mark.text, fontsize=9.5, fontweight="bold", color=mark.color, ha=align, va="center",
-                      parse_math=False)  # fmt: skip
+            write = partial(_write, axes, MARGIN - 12 - EDGE, x, ha=align)
+            write(y, mark.text, fontsize=9.5, fontweight="bold", color=mark.color)
             if line == LINES[0]:
-                detail = mark.detail if len(mark.detail) <= LETTERS else f"{mark.detail[: LETTERS - 1]}…"
-                axes.text(x, y + 14, detail, fontsize=7.8, color=style.SOFT, ha=align, va="center", parse_math=False)
+                write(y + 14, mark.detail, fontsize=7.8, color=style.SOFT)
     return sum(map(len, sides))
+
+
+def _write(axes: style.Axes, room: float, x: float, y: float, text: str, **look: Any) -> None:
+    """Write a line of text at a place of the picture, cut at its end to so many pixels."""
+    written = axes.text(x, y, text, va="center", parse_math=False, **look)
+    while text and (width := written.get_window_extent().width) > room:
+        text = text[: min(int(len(text) * room / width), len(text) - 1)]
+        written.set_text(f"{text}…")
 
 
 def heights(requested: np.ndarray, line: float, top: float, bottom: float) -> np.ndarray:
