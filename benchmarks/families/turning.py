@@ -17,6 +17,7 @@ import xarray as xr
 
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, table
+from flexclear import dynamics
 from flexclear.artifacts.paths import PROJECT
 from flexclear.dynamics import analyses
 from flexclear.scene.schema import Scene
@@ -213,6 +214,62 @@ def _friswell() -> Body:
     }
     recipe = rod(1.5, circle(0.025), "timoshenko", 24, material, frames=frames, interfaces=list(frames))
     return Body(recipe, "springs", springs=1e6, discs=discs, up_to=5e3)
+
+
+def two_discs(body: Body, kxx: float, kyy: float, kxy: float = 0.0) -> Scene:
+    """Return Friswell's rotor at 4000 rpm in two equal bearings of the ground [N/m].
+
+    The hub holds it along and about the axis.
+    """
+    scene = turning(body, 4000.0 * np.pi / 30.0)
+    scene["body"]["ground"]["frames"] |= {name: scene["body"]["hub"]["frames"][name] for name in "AB"}
+    K = np.zeros((6, 6))
+    K[:2, :2] = [[kxx, kxy], [kxy, kyy]]
+    bushings = {name: ([f"ground.{name}", f"rod.{name}"], K.tolist()) for name in "AB"}
+    bushings["coupling"] = (["hub.A", "rod.A"], [0, 0, 1e9, 0, 0, 1e6])
+    scene["load"] = {n: {"type": "bushing", "between": b, "stiffness": k} for n, (b, k) in bushings.items()}
+    return Scene.model_validate(scene)
+
+
+#: speed of the transients [rad/s]
+FASTEST = 2527.0
+
+
+def twisted(body: Body) -> xr.Dataset:
+    """Return the run of a shaft that turns at `FASTEST` while 2 N m at 2000 rad/s twist its free end."""
+    scene = turning(body, FASTEST)
+    torque = {"type": "harmonic", "amplitude": [2.0], "frequency": ["2000 rad/s"], "phase": [0.0]}
+    scene["load"] = {"end": {"type": "point-torque", "frame": "rod.B", "torque": [torque, 0.0, 0.0]}}
+    scene["body"]["hub"]["angular_velocity"] = [FASTEST, 0.0, 0.0]
+    scene |= {"time": {"end": 0.005}, "output": {"interval": 0.001}}
+    return dynamics.simulate(Scene.model_validate(scene), {"rod": reduced(body)}, silent)
+
+
+def spun_up(*, stiffening: bool) -> xr.Dataset:
+    """Return the run of a shaft spun up to `FASTEST` in 50 ms, past several whirls, its end pushed after 5 ms."""
+    body = Body(rod(1.2, circle(0.01), "timoshenko", 12), up_to=8e3, stiffening=stiffening)
+    scene, span = turning(body, FASTEST), 0.05
+    rise = [0.0] * 4 + [FASTEST * span * c / span**k for k, c in ((4, 2.5), (5, -3.0), (6, 1.0))]
+    turned = {"type": "polynomial", "coefficients": [0.5 * FASTEST * span, FASTEST], "origin": span}
+    spin = [{"start": 0.0, "law": {"type": "polynomial", "coefficients": rise}}, {"start": span, "law": turned}]
+    # 2 N (1 - cos(2 pi (t - 5 ms) / 5 ms)) between 5 and 10 ms
+    cosine = {"amplitude": [-2.0], "frequency": ["200 Hz"], "phase": [0.5 * np.pi], "offset": 2.0}
+    none, wave = {"type": "constant"}, {"type": "harmonic", **cosine}
+    pieces = [{"start": t, "law": law} for t, law in ((0.0, none), (0.005, wave), (0.01, none))]
+    force = {"type": "piecewise", "sections": pieces}
+    scene["drive"]["motor"]["law"] = {"type": "piecewise", "sections": spin}
+    scene["load"] = {"end": {"type": "point-force", "frame": "rod.B", "force": [0.0, force, 0.0]}}
+    scene |= {"time": {"end": 0.1}, "output": {"interval": 0.01}, "solver": {"rtol": 1e-9}}
+    return dynamics.simulate(Scene.model_validate(scene), {"rod": reduced(body)}, silent)
+
+
+def path_error(run: xr.Dataset) -> np.ndarray:
+    """Return the largest error of the end's path after `spun_up` in y and z [m], next to an exact beam."""
+    rows = [row for row in known()["7-spin-up"]["values"] if "displacement" in row[0]]
+    path = np.array([[value for name, _, value, _ in rows if f"displacement {axis}" in name] for axis in "yz"])
+    found = run["frame_position"].sel(frame="rod.B", axis=["y", "z"])
+    away = found.sel(time=0.01 * np.arange(1, 11), method="nearest").values.T - path
+    return np.asarray(np.abs(away).max(axis=1))
 
 
 CASES: dict[str, Callable[[], Body]] = {

@@ -7,16 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from benchmarks.families import turning
 from benchmarks.families.turning import ALONG, CASES, STEEL, Body, circle, compared, known, rectangle, rod, vibrations
-from flexclear import dynamics
 from flexclear.dynamics import analyses
 from flexclear.scene.schema import Scene
 from flexclear.structure.kinds import kind
 from flexclear.system.progress import silent
-from tests.properties.mechanisms import simulated
 
 #: 1.2 m of 20 mm steel, clamped to its hub, every coordinate of three elements
 SHAFT = Body(rod(1.2, circle(0.01), "rayleigh", 3))
@@ -135,19 +132,9 @@ def test_a_strip_buckles_sideways_as_its_elastica_does() -> None:
     assert critical == pytest.approx(1.0037, abs=1.8e-3)
 
 
-def torque_run() -> xr.Dataset:
-    """Turning shaft, free end twisted by 2 N m at 2000 rad/s."""
-    table = turning.turning(SHAFT, 2527.0)
-    torque = {"type": "harmonic", "amplitude": [2.0], "frequency": ["2000 rad/s"], "phase": [0.0]}
-    table["load"] = {"end": {"type": "point-torque", "frame": "rod.B", "torque": [torque, 0.0, 0.0]}}
-    table["body"]["hub"]["angular_velocity"] = [2527.0, 0.0, 0.0]
-    table |= {"time": {"end": 0.005}, "output": {"interval": 0.001}}
-    return dynamics.simulate(Scene.model_validate(table), {"rod": turning.reduced(SHAFT)}, silent)
-
-
 def test_twisting_a_turning_shaft_takes_the_energy_that_it_takes_at_rest() -> None:
     """Elastic energy each millisecond, by the modal series of the twist; it was four times too large."""
-    run = torque_run()
+    run = turning.twisted(SHAFT)
     rows = [row for row in known()["7-torque"]["values"] if row[0] == "elastic energy"][:5]
     found = [float(run["elastic"].sel(time=t, method="nearest")) for _, t, _, _ in rows]
     # six twist coordinates: frequencies 1e-4 high, and the series' rest, are some 1e-3 of the largest energy, 6e-3 J
@@ -170,26 +157,7 @@ def test_a_rectangular_shaft_is_unstable_between_its_two_critical_speeds() -> No
 @pytest.mark.parametrize("stiffening", [False, True])
 def test_a_shaft_is_spun_up_and_struck_as_a_geometrically_exact_beam(stiffening: bool) -> None:
     """To 2527 rad/s in 50 ms, past several whirls, with a push of 4 N on its free end after 5 ms: path of that end."""
-    shaft = Body(rod(1.2, circle(0.01), "timoshenko", 12), up_to=8e3, stiffening=stiffening)
-    table = turning.turning(shaft, 2527.0)
-    final, span = 2527.0, 0.05
-    rise = [0.0] * 4 + [final * span * c / span**k for k, c in ((4, 2.5), (5, -3.0), (6, 1.0))]
-    turned = {"type": "polynomial", "coefficients": [0.5 * final * span, final], "origin": span}
-    spin = [{"start": 0.0, "law": {"type": "polynomial", "coefficients": rise}}, {"start": span, "law": turned}]
-    # 2 N (1 - cos(2 pi (t - 5 ms) / 5 ms)) between 5 and 10 ms
-    cosine = {"amplitude": [-2.0], "frequency": ["200 Hz"], "phase": [0.5 * np.pi], "offset": 2.0}
-    none, wave = {"type": "constant"}, {"type": "harmonic", **cosine}
-    pieces = [{"start": t, "law": law} for t, law in ((0.0, none), (0.005, wave), (0.01, none))]
-    force = {"type": "piecewise", "sections": pieces}
-    table["drive"]["motor"]["law"] = {"type": "piecewise", "sections": spin}
-    table["load"] = {"end": {"type": "point-force", "frame": "rod.B", "force": [0.0, force, 0.0]}}
-    table |= {"time": {"end": 0.1}, "output": {"interval": 0.01}, "solver": {"rtol": 1e-9}}
-    run = simulated(Scene.model_validate(table), {"rod": turning.reduced(shaft)})
-    rows = [row for row in known()["7-spin-up"]["values"] if "displacement" in row[0]]
-    known_path = np.array([[value for name, _, value, _ in rows if f"displacement {axis}" in name] for axis in "yz"])
-    moved = run["frame_position"].sel(frame="rod.B", axis=["y", "z"])
-    path = moved.sel(time=0.01 * np.arange(1, 11), method="nearest").values.T
-    away = np.abs(path - known_path).max(axis=1)
+    away = turning.path_error(turning.spun_up(stiffening=stiffening))
     # in the plane of the push, 2.3e-4 m, frequencies 1e-5 high shift the phase of 40 waves by some 1e-3; across it the
     # end moves by 4.8e-6 m, through rotary inertia
     assert away[0] < 1.5e-6

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 
-from benchmarks.families.classes import ACROSS, ALONG, ARM, MASS, MIXED, SIDE, SLOPE, deflection, rotor
+from benchmarks.hard_scenes import ACROSS, ALONG, ARM, MASS, MIXED, SIDE, SLOPE, deflection, rotor
 from flexclear.commands.__main__ import main
 from flexclear.commands.frequencies import speeds
 from flexclear.dynamics import analyses

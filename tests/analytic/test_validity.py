@@ -2,15 +2,17 @@
 
 import re
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from benchmarks.families import classes
+from benchmarks import hard_scenes
 from flexclear.dynamics import analyses
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact import validity
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.evaluation.start import consistent_start
@@ -152,6 +154,13 @@ def test_pins_that_hold_a_door_upright_are_reported_with_their_moment(hinges: in
     assert "clearance-spherical" in text
 
 
+def test_a_contact_carries_its_force_times_half_its_length() -> None:
+    """At either end of the pin: 100 N on 30 mm carry up to 1.5 N m."""
+    pin = SimpleNamespace(length=0.03, clearance=5e-4)
+    assert validity.tilting("joint p", pin, 1.49, 100.0) == ""
+    assert "by 1.51 N m on average, more than its contact" in validity.tilting("joint p", pin, 1.51, 100.0)
+
+
 def test_balls_and_pins_in_a_plane_hold_no_tilt() -> None:
     assert not any("parallel" in text for text in reported(door("clearance-spherical", 2)))
     for name in ("clearance_pendulum", "scotch_yoke"):
@@ -169,7 +178,7 @@ def test_an_ensemble_whose_balls_leave_through_their_sockets_is_refused() -> Non
 
 def bounce(solver: dict[str, Any]) -> xr.Dataset:
     """A ball falls by 0.2 m on a hard plane and rebounds without loss: 1.96 J are exchanged."""
-    return simulated(classes.bounce(**solver))
+    return simulated(hard_scenes.bounce(**solver))
 
 
 @pytest.mark.parametrize(

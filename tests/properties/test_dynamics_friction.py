@@ -1,6 +1,7 @@
 """Friction laws: what every one must do, whoever adds one."""
 
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from flexclear.dynamics.contact import friction
+from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
+from flexclear.dynamics.mechanics.bearings import pressure
+from flexclear.dynamics.mechanics.vectors import Matrix, Vector, Wrench
+from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
 from tests.properties.kernels import from_python
 from tests.properties.test_dynamics_drives import adams_step
@@ -159,3 +164,24 @@ def test_bristles_that_hardly_slip_are_a_spring() -> None:
 def test_friction_that_cannot_be_is_refused(made: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         made()
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("kind", [PIN, SLIDER, BALL])
+def test_the_slopes_of_a_bearings_normal_force_are_its_derivatives(kind: int, seed: int) -> None:
+    """By the reaction of its joint, whichever way that points: Newton's method converges without them, but slowly."""
+    rng = np.random.default_rng(seed)
+    bearing = SimpleNamespace(kind=kind, axis=seed % 3)
+    numbers = SimpleNamespace(lever=1.7, axial=0.6, torsion=0.9, preload=2.0)
+    R = Matrix(rotation_vector_to_matrix(rng.normal(size=3)).ravel())
+    reaction, change = rng.normal(size=(2, 6))
+
+    def size(way: float) -> Any:
+        M, F = np.split(reaction + way * change, 2)
+        return pressure(bearing, numbers, R, Wrench(Vector(M), Vector(F)))
+
+    step, here = 1e-5, size(0.0)
+    slope = (size(step).size - size(-step).size) / (2.0 * step)
+    by_reaction = np.concatenate([here.by_M, here.by_F])
+    # differences are off by the third derivative times step^2 / 6, and by 1e-16 / step
+    assert by_reaction @ change == pytest.approx(slope, rel=1e-6, abs=1e-8)

@@ -43,8 +43,8 @@ SINGULAR_ROUNDING = 1e-9
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
     """Return the scene with the start of its ideal mechanism, and how that was assembled.
 
-    Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be moved to
-    their pressed positions.
+    Pins whose joints share a force in a way that nothing determines begin in the middle, where they cannot be pressed.
+    Raises InputError for an ideal scene that cannot be built, SolverError when other pins cannot be pressed.
     """
     ideal_scene, t = placed(scene), scene.time.start
     engine, y = _start_ideal(ideal_scene, bundles, progress)
@@ -58,7 +58,10 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
         engine, y = _pressed(exact, bundles, progress, forces)
     except (InputError, SolverError):
         if exact == concentric:
-            raise
+            if engine.mobility.redundant_joints.isdisjoint(replaceable_contacts(scene)):
+                raise
+            why = "the pins begin in the middle of their sockets: rigid bodies leave open how they share their force"
+            return concentric, f"{choice}\n{why}".strip()
         choice = f"{choice}\nthe pins are not pressed into their sockets without moving given joint positions".strip()
         engine, y = _pressed(concentric, bundles, progress, forces)
     return with_resting_contacts(
