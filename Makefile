@@ -75,7 +75,7 @@ atlas: $(READY) ## Stability of 301 hard cases: docs/stability.md (half an hour;
 	@$(RUN) -m benchmarks stability
 
 docs: $(READY) ## The documentation as a site: results/site/index.html
-	@$(RUN) -c 'import mkdocs' 2>/dev/null || \
+	@$(RUN) -c 'import distributed, ipykernel, mkdocs, nbclient' 2>/dev/null || \
 	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	@$(RUN) -m mkdocs build --quiet --strict --config-file benchmarks/site/mkdocs.yml
 	@echo results/site/index.html

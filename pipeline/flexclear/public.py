@@ -311,7 +311,7 @@ def compare(*scenes: AnyScene, ideal: bool | Literal["both", "clearance", "flexi
     Raises FlexclearError.
     """
     without = "both" if ideal is True else ideal or None
-    return comparison.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
+    return comparison.dataset([_loaded(scene) for scene in scenes], without)
 
 
 def effects(scene: AnyScene, budget: str | float | None = None, *, of: Sequence[str] | str = ()) -> xr.Dataset:
@@ -351,19 +351,25 @@ def render(scene: AnyScene) -> Path:
     return open_workplace().made(*Graph(one).render.values(), jobs=1)[0].folder
 
 
-def show(scene: AnyScene, folder: str | Path | None = None) -> Any:
-    """Return the start pose of a scene with all names, in seconds: nothing is run or compiled.
+def show(scene: AnyScene | xr.Dataset, folder: str | Path | None = None) -> Any:
+    """Return a page to turn, which a notebook shows: the motion of a run, or the start pose of a scene with all names.
 
-    folder: also write picture and page there, as ``flexclear show`` does.  In a notebook the result shows the
-    interactive page; `gaps` lists the joints that do not fit, `refused` says why (None where all fit).  Raises
-    InputError where no pose can be drawn.
+    A start takes seconds: nothing is run or compiled.  folder: also write the page there, and of a start the picture,
+    as ``flexclear show`` does.  Of a start, `gaps` lists the joints that do not fit, `refused` says why (None where all
+    fit).  Raises InputError where no pose can be drawn, and for a run from a file with flexible bodies, whose shapes
+    are not in it.
 
     >>> import flexclear as fc
     >>> seen = fc.show("scenes/checks/pendulum.toml")
     >>> [mark.text for mark in seen.view.marks], seen.refused
     (['bob', 'hinge'], None)
     """
-    return start_pose.start(_loaded(scene), None if folder is None else Path(folder))
+    from xarray import Dataset
+
+    target = None if folder is None else Path(folder)
+    if isinstance(scene, Dataset):
+        return start_pose.motion(scene, target)
+    return start_pose.start(_loaded(scene), target)
 
 
 def report(scene: AnyScene, budget: str | float | None = None, *, answers: bool = True) -> Path:

@@ -115,6 +115,7 @@ def test_every_library_that_is_imported_is_declared(root: Path):
     project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     requested = [*project["dependencies"], *extras["render"], *extras["cluster"], *extras["med"], *extras["robots"]]
+    requested += extras["notebooks"]
     declared = {re.split(r"[<>=]", name)[0].lower().replace("-", "_") for name in requested}
     declared |= {"skfem", "vtkmodules", "markdown_it", "flexclear", "papers"} | set(sys.stdlib_module_names)
     found = set()

@@ -308,15 +308,17 @@ def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, fresh: 
 
 def test_from_python_a_scene_without_a_requested_accuracy_is_planned_for_a_fraction_of_each_size(tmp_path: Path):
     """Without gravity the template's pendulum hangs still: the plan keeps it, and so its run is the scene's."""
-    planned, found = fc.plan(write("pendulum", tmp_path)[0], budget=30.0, accuracy="1 %")
+    both = planned, found = fc.plan(write("pendulum", tmp_path)[0], budget=30.0, accuracy="1 %")
     assert "gravity" in planned.load
     # the planned run has another tolerance: its error is within the accuracy that it was chosen for
     assert (found["error"] <= found["requested"]).all()
     assert (found["scatter"] == 0.0).all()
     shown = found._repr_html_()
     assert "must be modelled" in shown
-    assert "<img src='data:image/png" in shown
+    assert "src='data:image/png" in shown
     assert "met" in shown
+    shown = both._repr_html_()
+    assert shown.index("must be modelled") < shown.index("gravity (gravity)")
 
 
 def test_where_no_accuracy_has_a_plan_the_command_ends_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

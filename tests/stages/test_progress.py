@@ -2,8 +2,10 @@
 
 import io
 import logging
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,6 +14,7 @@ from flexclear.system.log import LOG, set_level, write_to
 from flexclear.workflow import schedule
 from flexclear.workflow.progress import Monitor, duration
 from flexclear.workflow.task import Task
+from tests.processes import printed
 
 
 class Screen(io.StringIO):
@@ -180,23 +183,44 @@ def test_the_loggers_level_sets_how_much_is_reported():
     assert reported[logging.DEBUG].count("a: simulate") == 3
 
 
-def test_a_notebook_rewrites_its_line_without_codes_of_terminals():
+def test_a_notebook_shows_bars_that_go(monkeypatch: pytest.MonkeyPatch):
     class Cell(io.StringIO):
         """As the stream of a cell is."""
 
+    class Handle:
+        """As a displayed output is."""
+
+        def update(self, html: str) -> None:
+            shown.append(html)
+
+    def display(html: str, *, display_id: bool) -> Handle:
+        assert display_id
+        shown.append(html)
+        return Handle()
+
+    shown: list[str] = []
     Cell.__module__ = "ipykernel.iostream"
+    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(HTML=str, display=display))
     screen, clock = Cell(), Clock()
     monitor = Monitor(screen, clock)
     monitor.start(1)
-    name = monitor.begin("a", "simulate")
+    name = monitor.begin("a < b", "simulate")
     clock.now = 1.0
     monitor.update(name, 0.5, "")
+    monitor.say("a: warning: something")
     monitor.finish(name, failed=False)
     monitor.end()
-    text = screen.getvalue()
-    assert "\033" not in text
-    assert "\n" not in text
-    assert text.rpartition("\r")[2] == ""
+    assert shown[0] == "<div><progress max='1' value='0.500'></progress> a &lt; b: simulate  50%</div>"
+    assert shown[-1] == ""
+    assert screen.getvalue() == "flexclear: a: warning: something\n"
+
+
+def test_a_level_that_is_set_before_the_first_import_stays():
+    program = (
+        "import logging; logging.getLogger('flexclear').setLevel(logging.ERROR); import flexclear.system.log as log; "
+        "print(log.LOG.level)"
+    )
+    assert printed(program).split() == [str(logging.ERROR)]
 
 
 def test_other_handlers_get_the_records():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from itertools import product
 from math import prod
 from typing import Any
@@ -12,18 +12,33 @@ import xarray as xr
 
 
 class Recorded(xr.Dataset):
-    """The dataset of a run. Its table has a row per recorded time, not one per combination of all dimensions."""
+    """The dataset of a run. Its table has a row per recorded time, not one per combination of all dimensions.
 
-    __slots__ = ()
+    `scene` is what was run, and `head` its HTML above the variables in a notebook; datasets made from this one have
+    neither.
+    """
+
+    __slots__ = ("_head", "_scene")
+
+    def _repr_html_(self) -> str:
+        head = getattr(self, "_head", None)
+        return f"{head(self) if head else ''}{super()._repr_html_()}"
 
     def to_dataframe(self, dim_order: Sequence[Hashable] | None = None) -> pd.DataFrame:
         """Return the variables over time as in `table`; with `dim_order`, xarray's table of all dimensions."""
         return table(self) if dim_order is None else super().to_dataframe(dim_order)
 
 
-def recorded(data: xr.Dataset) -> Recorded:
-    """Return the dataset of a run with its own `to_dataframe`."""
-    return Recorded(data.data_vars, coords=data.coords, attrs=data.attrs)
+def recorded(data: xr.Dataset, scene: Any = None, head: Callable[[Recorded], str] | None = None) -> Recorded:
+    """Return the dataset of a run with its own `to_dataframe`; scene, head: see `Recorded`."""
+    result = Recorded(data.data_vars, coords=data.coords, attrs=data.attrs)
+    result._scene, result._head = scene, head
+    return result
+
+
+def scene_of(run: xr.Dataset) -> Any:
+    """Return the scene that a dataset is the run of; None for one from a file, or made from another."""
+    return getattr(run, "_scene", None)
 
 
 def table(dataset: xr.Dataset, rows: Sequence[Hashable] = ("time",)) -> pd.DataFrame:

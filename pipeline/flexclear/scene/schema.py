@@ -368,7 +368,7 @@ class Scene(Part):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        """Return the title, the times and a table of the parts by kind, for a notebook."""
+        """Return the title, the times, a picture and a table of the parts by kind, for a notebook."""
         return as_html(self)
 
     def summary(self) -> str:

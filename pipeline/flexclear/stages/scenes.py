@@ -35,6 +35,7 @@ from flexclear.stages import export, simulation
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
 from flexclear.stages.meshing import kind_of
+from flexclear.stages.notebook import run_head
 from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
 from flexclear.system.errors import InputError, ResourceError, SolverError, errors_from, errors_of, refuse
 from flexclear.system.external_files import reading, require_file
@@ -112,7 +113,7 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     (made,) = workplace.datasets(task, jobs=1)
     from flexclear.artifacts.table import recorded
 
-    return recorded(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)))
+    return recorded(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)), scene, run_head)
 
 
 def results(scene: Scene | str | Path) -> xr.DataTree:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.post.pages import viewer, viewer_page
+from flexclear.post.pages import small_picture, viewer, viewer_page
 from flexclear.post.render import gl
-from flexclear.scene import lines
+from flexclear.scene import lines, notebook
 from flexclear.stages import meshing, rendering, scenes, simulation
 from flexclear.stages.workplace import relative
-from flexclear.system.errors import InputError, ResourceError
+from flexclear.system.errors import FlexclearError, InputError, ResourceError
+from flexclear.system.progress import silent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,17 +36,10 @@ def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> t
 
 
 @dataclass(frozen=True)
-class Start:
-    """Result of `flexclear.show`: the view, the error that refuses the start, and the page."""
+class Page:
+    """Result of `flexclear.show`: a page to turn, which a notebook shows."""
 
-    view: StartView
-    refused: InputError | None
     page: bytes
-
-    @property
-    def gaps(self) -> dict[str, str]:
-        """Description of each joint's gap, by name; empty where all joints fit."""
-        return {gap.joint: gap.words for gap in self.view.gaps}
 
     def _repr_html_(self) -> str:
         """Return the page for a notebook, in a frame of its own so that its style stays there."""
@@ -53,12 +47,59 @@ class Start:
         return f'<iframe srcdoc="{text}" width="100%" height="760" style="border:0"></iframe>'
 
 
+@dataclass(frozen=True)
+class Start(Page):
+    """The page of a scene's start, with the view, and the error that refuses the start."""
+
+    view: StartView
+    refused: InputError | None
+
+    @property
+    def gaps(self) -> dict[str, str]:
+        """Description of each joint's gap, by name; empty where all joints fit."""
+        return {gap.joint: gap.words for gap in self.view.gaps}
+
+
 def start(scene: Scene, folder: Path | None = None) -> Start:
     """Return the start pose of a scene; write picture and page where a folder is given.  Raises InputError."""
     view, refused = drawn(scene)
     if folder is not None:
         files_of(scene, view, folder)
-    return Start(view, refused, _page(scene, view))
+    return Start(_page(scene, view), view, refused)
+
+
+def motion(run: xr.Dataset, folder: Path | None = None) -> Page:
+    """Return the page of a run; write it where a folder is given.  Raises InputError for bodies that are not known."""
+    from flexclear.artifacts.table import scene_of
+    from flexclear.post.single_run.series import parameters
+
+    scene, bodies = scene_of(run), parameters(run).get("body")
+    if not bodies:
+        raise InputError("show", "the dataset is not that of a run", "give what fc.run returns, or a scene")
+    if scene is None and any(body["type"] == "flexible" for body in bodies.values()):
+        problem = "the shapes of flexible bodies are not in the dataset of a run from a file, or made from another"
+        raise InputError("show", problem, "give what fc.run returns: fc.show(fc.run(scene))")
+    params: dict[str, Any] = {"what": "motion", "format": "html", "title": str(run.attrs.get("title", ""))}
+    bundles = {} if scene is None else scenes.bundles(scene)
+    inputs = {"run": run, **{f"bundle/{name}": bundle for name, bundle in bundles.items()}}
+    files = rendering.run(params if scene is None else rendering.params(scene, "motion", "html"), inputs, silent)
+    if folder is not None:
+        _write(folder, files)
+    return Page(*files.values())
+
+
+def _small(scene: Scene) -> str:
+    """Return a picture of a scene's start for a notebook; nothing where none can be drawn."""
+    from flexclear.post.render.pictures import png
+    from flexclear.post.render.sketch import sketch
+
+    try:
+        return small_picture(png(sketch(drawn(scene)[0].drawn)))
+    except FlexclearError:
+        return ""
+
+
+notebook.PICTURES.append(_small)
 
 
 def drawn(scene: Scene) -> tuple[StartView, InputError | None]:
@@ -98,6 +139,10 @@ def files_of(scene: Scene, view: StartView, folder: Path, *, quiet: bool = False
         content[f"{stem}_start.png"] = png(picture(view, scene.title or stem))
     elif not quiet:
         print(f"flexclear: warning: no picture, only the page: {gl.remedy()}", file=sys.stderr)
+    return _write(folder, content)
+
+
+def _write(folder: Path, content: dict[str, bytes]) -> list[Path]:
     try:
         for name, data in content.items():
             (folder / name).write_bytes(data)

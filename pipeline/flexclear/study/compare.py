@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from flexclear.artifacts.store import publish
 from flexclear.post.pages import Part, page
@@ -10,10 +11,13 @@ from flexclear.scene.schema import Scene
 from flexclear.scene.variants import EFFECTS, ideal, replaceable_contacts
 from flexclear.stages.graph import Graph
 from flexclear.stages.scenes import joined, pictures, tables
-from flexclear.stages.workplace import Made, Workplace, check
+from flexclear.stages.workplace import Made, Workplace, check, open_workplace
 from flexclear.study import members
 from flexclear.system.errors import InputError, of_trial
 from flexclear.workflow.task import Task
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: what `--ideal` removes: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
@@ -58,6 +62,17 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
     title = f"Compared: {', '.join(graphs)}"
     publish(made.folder / "index.html", page(title, "The first run is the reference.", parts(made)))
     return made
+
+
+def dataset(scenes: list[Scene], without: str | None = None) -> xr.Dataset:
+    """Return the comparison that `bring` makes, as a dataset that shows it in a notebook."""
+    from flexclear.post.answers.answered import answered
+
+    made = bring(scenes, open_workplace(), without)
+    data, picture = made.dataset(), next(iter(PICTURES))
+    names = ", ".join(map(str, data["run"].values))
+    drawn = made.read(picture) if picture in made.record.files else None
+    return answered(data, f"Compared: {names}", drawn, tables(made, *TABLES))
 
 
 def ideal_scenes(scene: Scene, without: str) -> list[Scene]:

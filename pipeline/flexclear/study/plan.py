@@ -6,7 +6,7 @@ import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from flexclear.artifacts.store import publish
 from flexclear.post.plotting.table import as_html, as_markdown
@@ -71,7 +71,17 @@ def with_accuracy(scene: Scene, level: str) -> Scene:
     return asked
 
 
-def dataset(scene: Scene, level: str | None, budget: str | float | None) -> tuple[Scene, xr.Dataset]:
+class Result(NamedTuple):
+    """A plan in a notebook: its answer, then the planned scene."""
+
+    planned: Scene
+    evidence: xr.Dataset
+
+    def _repr_html_(self) -> str:
+        return f"{self.evidence._repr_html_()}{self.planned._repr_html_()}"
+
+
+def dataset(scene: Scene, level: str | None, budget: str | float | None) -> Result:
     """Return the planned scene, and the plan as a dataset that shows its answer in a notebook.
 
     level: accuracy of all watched quantities; None for that of the scene, else LEVEL.  budget: time for `errors_of`
@@ -89,7 +99,7 @@ def dataset(scene: Scene, level: str | None, budget: str | float | None) -> tupl
             {name: compared[name] for name in ("requested", "error", "chance", "allowed", "horizon", "scatter")}
         )
         table = as_html(verified(compared)) + table
-    return planned.planned, answered(result, words(result), planned.made.read("plan.png"), table)
+    return Result(planned.planned, answered(result, words(result), planned.made.read("plan.png"), table))
 
 
 @dataclass(frozen=True)

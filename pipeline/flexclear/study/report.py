@@ -16,6 +16,7 @@ from flexclear.scene.output import rows
 from flexclear.scene.provenance import assumed_values
 from flexclear.scene.variants import replaceable_contacts
 from flexclear.stages import derived_series
+from flexclear.stages.notebook import COST
 from flexclear.stages.scenes import in_file, pictures
 from flexclear.stages.workplace import (
     Made,
@@ -48,20 +49,6 @@ joint_friction.png | Friction of ideal joints | Normal force in the bearings and
 watched.png | Watched quantities | Quantities that the scene watches, over time
 energy.png | Energy | Energies over time, and the error of their balance
 """)
-}
-#: attributes of a run that say how it was computed, and their labels
-COST = {
-    "method": "integrator",
-    "method_reason": "reason for this integrator",
-    "evaluations": "evaluations of the equations of motion",
-    "steps": "steps",
-    "rejected_steps": "rejected steps (error too large)",
-    "jacobians": "Jacobians of the equations",
-    "projections": "projections onto the loop closures",
-    "switched": "another integrator continued",
-    "stiff_share": "fraction of the steps limited by stability instead of accuracy",
-    "redundant_closure_rows": "redundant loop closure conditions",
-    "accuracy_verdict": "requested accuracy",
 }
 PROVENANCE = {
     "scene": "scene",

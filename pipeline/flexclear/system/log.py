@@ -49,5 +49,6 @@ if not LOG.handlers:
     _HANDLER.setFormatter(_Plain("flexclear: %(message)s"))
     LOG.addHandler(_HANDLER)
     LOG.propagate = False
-    LOG.setLevel(logging.INFO)
+    if LOG.level == logging.NOTSET:  # the user's choice may come first
+        LOG.setLevel(logging.INFO)
 write_to(None)

@@ -7,12 +7,13 @@ sparse lines where the output is a file.
 
 from __future__ import annotations
 
+import html
 import logging
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TextIO
+from typing import Any, TextIO
 
 from flexclear.system.log import LOG, write_to
 
@@ -42,7 +43,7 @@ class Job:
 
 @dataclass
 class Monitor:
-    """Displays running tasks: on a terminal or in a notebook as one line that is rewritten, else as sparse lines.
+    """Displays running tasks: on a terminal as one line that is rewritten, in a notebook as bars, else as sparse lines.
 
     The logger's level decides the amount: from WARNING on no progress; at DEBUG a line for every report.
     """
@@ -53,6 +54,7 @@ class Monitor:
     total: int = 0
     done: int = 0
     drawn: float = 0.0
+    cell: Any = None  #: the output of a notebook's cell that shows progress
 
     def __post_init__(self) -> None:
         write_to(self.out)
@@ -69,7 +71,7 @@ class Monitor:
 
     @property
     def rewrites(self) -> bool:
-        """True when one line is rewritten, as on a terminal."""
+        """True when what is shown is replaced, as on a terminal."""
         return (self.out.isatty() or _in_notebook(self.out)) and not self.verbose
 
     def start(self, total: int) -> None:
@@ -122,12 +124,13 @@ class Monitor:
     def end(self) -> None:
         """Clear the line after all tasks have ended."""
         if self.rewrites and not self.quiet:
-            self._write(_clear(self.out))
+            self._rewrite("")
+            self.cell = None
 
     def say(self, text: str) -> None:
         """Print a warning as a permanent line."""
         if self.rewrites and not self.quiet:
-            self._write(_clear(self.out))
+            self._rewrite("")
         LOG.warning("%s", text)
 
     def _count(self) -> str:
@@ -158,12 +161,22 @@ class Monitor:
         # 0.1: least time between two redraws of the line on a terminal [s]
         elif self.clock() - self.drawn >= 0.1 or not text:
             self.drawn = self.clock()
-            line = self._count() + " | ".join(self._line(job) for job in self.jobs.values())
-            self._write(_clear(self.out) + line[: _columns(self.out)])
+            self._rewrite(self._count() + " | ".join(self._line(job) for job in self.jobs.values()))
 
-    def _write(self, text: str) -> None:
-        self.out.write(text)
-        self.out.flush()
+    def _rewrite(self, line: str) -> None:
+        """Replace the line on the terminal, or in a notebook the bars of the cell."""
+        if not _in_notebook(self.out):
+            self.out.write(f"\r\033[K{line[: _columns(self.out)]}")
+            self.out.flush()
+            return
+        from IPython.display import HTML, display
+
+        bars = "".join(_bar(job.fraction, self._line(job)) for job in self.jobs.values()) if line else ""
+        shown = HTML(f"{self._count()}{bars}" if bars else "")
+        if self.cell is not None:
+            self.cell.update(shown)
+        elif bars:
+            self.cell = display(shown, display_id=True)
 
 
 def duration(seconds: float) -> str:
@@ -175,13 +188,14 @@ def duration(seconds: float) -> str:
 
 
 def _in_notebook(out: TextIO) -> bool:
-    """Return True for the output of a notebook cell, which interprets carriage returns but no other control."""
+    """Return True for the output of a notebook's cell, which shows HTML."""
     return type(out).__module__.partition(".")[0] == "ipykernel"
 
 
-def _clear(out: TextIO) -> str:
-    """Return the control characters that clear the current line."""
-    return f"\r{' ' * _columns(out)}\r" if _in_notebook(out) else "\r\033[K"
+def _bar(fraction: float | None, text: str) -> str:
+    """Return a bar as HTML; without a fraction it shows that work goes on."""
+    value = "" if fraction is None else f" value='{fraction:.3f}'"
+    return f"<div><progress max='1'{value}></progress> {html.escape(text)}</div>"
 
 
 def _columns(out: TextIO) -> int:

@@ -6,7 +6,7 @@ import html
 
 import xarray as xr
 
-from flexclear.post.pages import media
+from flexclear.post.pages import small_picture
 
 
 class Answered(xr.Dataset):
@@ -21,6 +21,6 @@ class Answered(xr.Dataset):
 def answered(data: xr.Dataset, text: str, picture: bytes | None = None, table: str = "") -> Answered:
     """Return the dataset with an answer: text, a picture as PNG, a table as HTML."""
     result = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
-    image = "" if picture is None else media("answer.png", picture, "")
+    image = "" if picture is None else small_picture(picture)
     result._answer = f"<p>{html.escape(text)}</p>{image}{table}"
     return result

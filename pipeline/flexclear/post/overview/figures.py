@@ -134,13 +134,24 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
 
 def _watched_figures(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
     """Draw watched quantities that no other figure shows."""
-    others = [quantity for quantity in watched if quantity.component or quantity.kind not in ELSEWHERE]
-    panels: list[Panel] = []
-    for line in (line for quantity in others for line in curves([run], quantity) if line is not None):
-        factor, unit = by_unit({"": line.values}, line.unit)
-        panels.append((f"{line.title} ({unit})", {"": (factor * line.values, {"lw": 0.9})}))
+    panels = _curves(run, [one for one in watched if one.component or one.kind not in ELSEWHERE])
     heading = ("Watched quantities", "vectors: the magnitude, or the component in the name")
     return _sheet("watched", run["time"].values, panels, 1, heading, width=8.0) if panels else {}
+
+
+def watched_curves(run: xr.Dataset, watched: Sequence[Quantity], width: float = 8.0) -> bytes | None:
+    """Return PNG of quantities over time, one below the other; width [inches]; None where none has a curve."""
+    panels = _curves(run, watched)
+    with style.style():
+        return _sheet("", run["time"].values, panels, 1, ("", ""), width=width)[".png"] if panels else None
+
+
+def _curves(run: xr.Dataset, watched: Sequence[Quantity]) -> list[Panel]:
+    panels: list[Panel] = []
+    for line in (line for quantity in watched for line in curves([run], quantity) if line is not None):
+        factor, unit = by_unit({"": line.values}, line.unit)
+        panels.append((f"{line.title} ({unit})", {"": (factor * line.values, {"lw": 0.9})}))
+    return panels
 
 
 def _without_noise(run: xr.Dataset, values: np.ndarray, unit: str) -> np.ndarray:

@@ -158,6 +158,11 @@ def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
     return f"<figure{look}><figcaption>{html.escape(caption)}</figcaption>{shown}</figure>\n"
 
 
+def small_picture(png: bytes) -> str:
+    """Return a picture for a notebook."""
+    return f"<img style='max-width:min(100%,36em)' alt='' src='data:image/png;base64,{base64.b64encode(png).decode()}'>"
+
+
 def prose(heads: Sequence[str], rows: Collection[Sequence[str]]) -> str:
     """Return a table of sentences, with `backticks` as code; empty without rows."""
     if not rows:
