@@ -16,11 +16,12 @@ from flexclear.dynamics.equations.closures import make_closing
 from flexclear.dynamics.equations.projection import make_stiffen
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.mechanics.of_topology import program_of
+from flexclear.dynamics.mechanics.of_topology import list_of, program_of
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
@@ -34,10 +35,9 @@ from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
-from tests.properties.articulated_chains import Evaluated, Long, bending, evaluated, reduced, rods, tabulated
+from tests.properties.articulated_chains import Evaluated, bending, evaluated, reduced, rods, tabulated
 from tests.properties.mechanisms import Table
 from tests.properties.test_closure_rows import dense_factor
-from tests.properties.test_specialised import description_kernel
 
 #: of the largest; the mass matrix of the chains here has a condition of 1e5 at most, of which 2e-12 was left
 ROUNDING = 1e-9
@@ -198,15 +198,16 @@ def test_projection_and_exponential_steps_read_the_same(name: str) -> None:
 
 def mass_by_energy(found: Evaluated) -> np.ndarray:
     """Mass matrix of the state's speeds by the kinetic energies of motions, which no factor has a part in."""
-    model, h, w = found.model, found.h, found.w.astype(np.longdouble)
-    plain, u = Long(0).plain(description_kernel(model)), slice(int(h[m.U]), int(h[m.U]) + len(found.stretch(m.U)))
+    model, h, w, f = found.model, found.h, found.w.astype(np.longdouble), found.model.arrays.f.astype(np.longdouble)
+    topology, y = topology_of(model.arrays, h), int(h[m.Y])
+    w[h[m.LAW.at] :][: m.LAW.size * model.arrays.size(m.N_LAWS)] *= np.tile([1, 0, 0], model.arrays.size(m.N_LAWS))
 
     def energy(speeds: np.ndarray) -> Any:
-        w[u] = speeds
-        plain(h.tolist(), model.arrays.f.astype(np.longdouble), w, found.space.n)
+        w[y : y + model.ny][model.speeds] = speeds
+        list_of(model.parts, topology, m.RECORD_CALLS, Numbers(h, f, w, found.space.n, y, int(h[m.SLOPES])))
         return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 
-    units = np.eye(len(found.stretch(m.U)))[: model.nv]
+    units = np.eye(model.nv)
     alone = [energy(unit) for unit in units]
     M = np.diag([2.0 * one for one in alone])
     for i in range(model.nv):

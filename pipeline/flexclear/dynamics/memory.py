@@ -165,8 +165,9 @@ class Room:
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`). RATES: the function that steps
-#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`)
-EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS = ADDRESSES = _indices(8)
+#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`);
+#: DESCRIBE, RECORD_CALLS: the function that stores what the record has as well, and its list
+EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RECORD_CALLS = ADDRESSES = _indices(9)
 
 # Topology in h -------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;

@@ -4,8 +4,8 @@ A file composes exactly the kernels of the kinds present: kernels that a scene d
 compiled. A file depends on no more than it needs, so that mechanisms share files: steps depend on the integrator and on
 the presence of closures and contacts, not on joints or bodies.
 
-Effects declare what they add to a file (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
-right-hand side) and "observe" (recorded quantities).
+Effects declare what they add to a file (`effects.effect`), at three points: "forces", "closures" and "evaluate" (the
+right-hand side).
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ FAMILIES = {
 }
 #: modules of calls by address, and of functions assembled from LLVM code
 CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
-#: specialised code: right-hand side as steps call it, right-hand side with all its side results, recorded quantities
-SPECIALISED, WHOLE, DESCRIBED = "specialised", "whole", "described"
+#: specialised code: right-hand side as steps call it, right-hand side with all its side results
+SPECIALISED, WHOLE = "specialised", "whole"
 PROGRAM, BATCHED = f"{DYNAMICS}.specialise.program", (f"{DYNAMICS}.specialise", "batched")
 PRESCRIBED, RIGHT_HAND_SIDE = f"{DYNAMICS}.equations.prescribed_motion", f"{DYNAMICS}.equations.right_hand_side"
 
@@ -151,10 +151,8 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
 
 
 def kernels(parts: Parts) -> dict[str, str]:
-    """Return the sources of generic right-hand side and recorded quantities, for a topology without own code."""
-    formulas = _formulas(parts)
-    described = _description(parts).calling("describe", formulas=formulas)
-    return {"evaluate": _right_hand_side(parts).calling("evaluate", "t, y, dy", formulas), "describe": described}
+    """Return the source of the generic right-hand side, for a topology without own code."""
+    return {"evaluate": _right_hand_side(parts).calling("evaluate", "t, y, dy", _formulas(parts))}
 
 
 def _laws(parts: Parts) -> Composition:
@@ -178,7 +176,7 @@ def specialised(
 ) -> str:
     """Return the source of specialised code for one topology.
 
-    name: of the right-hand side as steps call it, of that with all its side results, or of the recorded quantities.
+    name: of the right-hand side as steps call it, or of that with all its side results.
     exact: True for the same bits as in each of several lanes.  routines: True where these serve the mechanism, for
     steps; else its kernels do.
     """
@@ -186,12 +184,11 @@ def specialised(
         longest = "LONGEST" if exact else "LONGEST_STRAIGHT"
         used = [FILES, (PROGRAM, "llvm_text"), (PROGRAM, "NAME")]
         return _of_topology(parts, topology, STRAIGHT, used, longest, routines, exact=exact)
-    file = _description(parts) if name == DESCRIBED else _equations(parts)
+    file = _equations(parts)
     for taken in ("llvm_text", "program", "NAME"):
         file.take(PROGRAM, taken)
     file.what += ", for one topology"
-    options = ", describes=True" if name == DESCRIBED else ""
-    function = ONE_TOPOLOGY.format(topology=_rows(topology), kernel=file.kernel, options=options)
+    function = ONE_TOPOLOGY.format(topology=_rows(topology), kernel=file.kernel)
     return file.text(function, _formulas(parts), FILES)
 
 
@@ -246,10 +243,10 @@ def for_python(parts: Parts) -> Iterator[tuple[str, str, str]]:
     They call those before them as the names of `calls`.
     """
     formulas = _formulas(parts)
-    files = {"laws": _laws(parts), "evaluate": _right_hand_side(parts), "describe": _description(parts)}
+    files = {"laws": _laws(parts), "evaluate": _right_hand_side(parts)}
     files |= {"project": _projection(parts)} if parts.closures else {}
     for name, file in (files | {"observe": _observation(parts)}).items():
-        yield name, file.kernel, file.text("", formulas if name in ("evaluate", "describe") else "")
+        yield name, file.kernel, file.text("", formulas if name == "evaluate" else "")
 
 
 def _equations(parts: Parts, *, whole: bool = True) -> Composition:
@@ -276,21 +273,10 @@ def _projection(parts: Parts) -> Composition:
     return file
 
 
-def _description(parts: Parts) -> Composition:
-    """Return a file for the recorded quantities of an evaluation."""
-    maker = (f"{DYNAMICS}.equations.observation", "make_description")
-    file = _forces(parts, "what is recorded of", "description", maker)
-    file.add_effects("observe")
-    if parts.closures:
-        file.add_effects("observe closures")
-    return file
-
-
 def _observation(parts: Parts) -> Composition:
     """Return a file for the record of states."""
     file = Composition(parts, "record", "observation", (f"{DYNAMICS}.equations.observation", "make_observation"))
-    file.given = {"evaluate": "calls.evaluate", "laws": "calls.laws", "describe": "calls.describe"}
-    file.given["project"] = file.projection
+    file.given = {"describe": "calls.describe", "project": file.projection}
     return file
 
 
@@ -383,7 +369,7 @@ def _formulas(parts: Parts) -> str:
 # laws of time are not specialised: their pieces change with time, and their number with the scene's numbers
 ONE_TOPOLOGY = """TOPOLOGY = (
 {topology})
-files.assembles(__name__, NAME, lambda: llvm_text(program({kernel}, TOPOLOGY{options}){options}), 0)
+files.assembles(__name__, NAME, lambda: llvm_text(program({kernel}, TOPOLOGY)), 0)
 """
 STRAIGHT = """TOPOLOGY = (
 {topology})

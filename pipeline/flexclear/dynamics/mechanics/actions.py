@@ -103,9 +103,8 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
         kind = tuple(name.split(maxsplit=1))
         states, rates = _internal(tables, int(row["internal0"]), STATES.get(kind[0], 0))
         reading = _Reading(tables, frames, [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]])
-        for k in (row["gauge"], row["measured"]):
-            if k >= 0:
-                reading.coordinate(k)
+        own = [reading.coordinate(k) for k in (row["gauge"], row["measured"]) if k >= 0]
+        shown = ("coordinate", own[-1]) if own else ("distance" if row["a"] >= 0 else "nothing", 0)
         read = []
         for i, index in enumerate(looks["index"][slice(*look)].tolist()):
             joint = {f"q{i}", f"r{i}"}.intersection(name.split())
@@ -118,9 +117,11 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
             states,
             reading.gauged,
             read,
+            shown if tables.recorded else (),
         )
-        bends = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
-        made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
+        results = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
+        results += tables.row(m.LOAD, len(made)) if tables.recorded else []
+        made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *results], int(row["book"])))
     return made
 
 
@@ -146,12 +147,12 @@ def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier])
             one = table(m.NAMED["bearings"])[e]
             what, numbers = Bearing(*(int(one[name]) for name in Bearing._fields)), tables.record("bearing_numbers", e)
             bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
-            bends, load = tables.row(m.NAMED["bends"], e), tables.record("bearing", e).load
-            given = what, laws[one["law"]], numbers, bristle
-            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:]))
+            bends, (load, *rest) = tables.row(m.NAMED["bends"], e), tables.row(m.NAMED["bearing"], e)
+            given, record = (what, laws[one["law"]], numbers, bristle), rest if tables.recorded else []
+            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:], record))
         link = carriers[row["link"]] if row["link"] >= 0 else None
         if isinstance(link, Link):
-            link.rubbed = True
+            link.watched = True
         joint, second = (frames[row["site_a"]], frames[row["site_b"]]), -1 if row["reversed"] else 1
         made.append(Rubbing(joint, link, second, int(row["closure"]), bearings, slot + k))
     return made

@@ -71,6 +71,15 @@ def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, 
 
 
 @routine
+def recorded(slip: Vector, loss: Any, unit: Wrench, b: End) -> tuple[Any]:
+    """Return what the record has of a bearing besides its load (`memory`): all but the sliding speed per normal force.
+
+    slip, loss, unit: see `friction_of`.
+    """
+    return ((sqrt(dot(slip, slip)), loss, unit.about(carried(*b).p_WB)),)
+
+
+@routine
 def reaction_in_tree(
     second: int, rest: Resistance, a: Twist, with_known: int, passing: Sequence[Any], motion: Motion, b: End
 ) -> Wrench:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 from flexclear.dynamics import memory as m
@@ -35,9 +35,9 @@ def status(reports: t.Numbers, sound: Any, least: Any, jammed: Any) -> tuple[Any
 REPORTS = (m.OK, m.JAMMED, m.SINGULAR, m.NOT_POSITIVE)
 
 
-def evaluated(mechanism: Mechanism, calls: CallList) -> CallList:
+def evaluated(mechanism: Mechanism, calls: CallList) -> Loops:
     """Append the calls that store the rates of the state, and what steps read besides: contacts, bearings and kinks of
-    loads, residuals of the loops, and the independence of their rows."""
+    loads, residuals of the loops, and the independence of their rows. Return the loops."""
     with calls.building():
         placed(mechanism)
         supplied = acted(mechanism, calls)
@@ -49,7 +49,7 @@ def evaluated(mechanism: Mechanism, calls: CallList) -> CallList:
         accelerated(mechanism, calls)
         calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_links(mechanism)]))
         calls.store([Cell(RESULTS, 0)], status, [calls.number(one) for one in REPORTS], sound, loops.least, jammed)
-    return calls
+    return loops
 
 
 def placed(mechanism: Mechanism) -> None:
@@ -91,11 +91,11 @@ def eliminated(mechanism: Mechanism) -> Any:
                 more = f.bend(more, station, modes.q)
             need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
             modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
-        elif link.driven or link.rubbed:
+        elif link.driven or link.watched:
             link.rest = t.resist(link.motion, link.body, link.beyond)
         if link.driven:
             rest = t.carry(link.step, link.rest) if link.on_link else None
-        elif link.modes or link.rubbed:
+        elif link.modes or link.watched:
             rest, link.gains, link.forces, sound = t.free_joint(carried_on, link.rest, link.bounds, link.step, sound)
         else:
             given = carried_on, link.motion, link.body, link.bounds, link.step, link.beyond, sound
@@ -103,6 +103,10 @@ def eliminated(mechanism: Mechanism) -> Any:
         if rest:
             link.frame.resist(rest)
     return sound
+
+
+#: frames and wrenches on them, one for each row
+Ends = Sequence[tuple[Frame, c.Wrenches]]
 
 
 class Spread(NamedTuple):
@@ -113,12 +117,14 @@ class Spread(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """Closures that are solved for: their rows passed to the ground, with their wrenches on the second body, and their
-    multipliers; the factor of their matrix, and its smallest pivot."""
+    """Closures that are solved for: their rows passed to the ground, with the frames and wrenches of their ends, and
+    their multipliers, and the part of these by friction in joints; the factor of their matrix, and its smallest
+    pivot."""
 
     found: dict[int, Spread]
-    on_second: dict[int, c.Wrenches]
+    ends: dict[int, Ends]
     multipliers: dict[int, t.Numbers]
+    by_friction: dict[int, t.Numbers]
     L: c.Blocks
     least: Any
 
@@ -130,14 +136,14 @@ class Loops(NamedTuple):
 def closed(mechanism: Mechanism, calls: CallList) -> Loops:
     """Add the closures' forces to those of all links."""
     found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
-    numbers, on_second = list[int](), dict[int, c.Wrenches]()
+    numbers, ends = list[int](), dict[int, Ends]()
     for number, one in enumerate(mechanism.closures):
-        kept, ends = len(one.scales), (frame.placed for frame in one.frames)
-        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *ends)
+        kept, places = len(one.scales), (frame.placed for frame in one.frames)
+        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *places)
         if not kept:
             continue
-        i = len(found)
-        mine, gamma, S[i, i] = passed_inwards(list(zip(one.frames, wrenches, strict=True)), gamma)
+        i, ends[number] = len(found), list(zip(one.frames, wrenches, strict=True))
+        mine, gamma, S[i, i] = passed_inwards(ends[number], gamma)
         for moved, V in mine.V.items():
             for k in moved_by.setdefault(moved, []):
                 before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
@@ -146,13 +152,12 @@ def closed(mechanism: Mechanism, calls: CallList) -> Loops:
         found.append(mine)
         right.append(gamma)
         numbers.append(number)
-        on_second[number] = wrenches[1]
     if not mechanism.closures:
-        return Loops({}, {}, {}, {}, 1.0)
+        return Loops({}, {}, {}, {}, {}, 1.0)
     L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
     calls.write([mechanism.least_pivot], [least])
     multipliers = dict(zip(numbers, c.solved(L, right), strict=True))
-    loops = Loops(dict(zip(numbers, found, strict=True)), on_second, multipliers, L, least)
+    loops = Loops(dict(zip(numbers, found, strict=True)), ends, multipliers, {}, L, least)
     for number, mine in loops.found.items():
         for moved, V in mine.V.items():
             moved.forces = c.with_multipliers(moved.forces, V, multipliers[number])
@@ -200,6 +205,8 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
         ends, wrenches, units = [frame.placed for frame in joint.frames], list[Any](), list[Wrench]()
         for one in joint.bearings:
             on_both, unit, loss, R_WB = calls.store(one.sliding, b.friction_of, *one.given, *ends)
+            if one.record:
+                calls.store(one.record, b.recorded, one.sliding[:3], loss, unit, ends[1])
             wrenches.append(on_both)
             units.append(unit)
             losses.append(loss)
@@ -219,12 +226,12 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
         moved.forces = c.with_multipliers(moved.forces, list(zip(*V, strict=True)), loads)
     for number, mine in loops.found.items():
         rows = list(zip(*(by.multipliers[number] for by in influences), strict=True))
-        more = c.with_multipliers([0.0] * len(rows), rows, loads)
+        more = loops.by_friction[number] = c.with_multipliers([0.0] * len(rows), rows, loads)
         for link, on_it in mine.through.items():
             link.closing.append((on_it, more))
-    for by, load in zip(influences, loads, strict=True):
+    for by, joint, load in zip(influences, of_bearing, loads, strict=True):
         for link, wrench in by.through.items():
-            link.closing.append(([wrench], [load]))
+            (link.own if link is joint.link else link.closing).append(([wrench], [load]))
     powers = [b.lost(*one) for one in zip(loads, losses, strict=True)]
     return [(joint.book, power) for joint, power in zip(of_bearing, powers, strict=True)], jammed
 
@@ -274,7 +281,8 @@ def reaction(loops: Loops, joint: Rubbing, by: Influence | None = None, *, own: 
     bearing alone; own: True for a bearing of the joint itself."""
     second, link, multipliers = joint.frames[1].placed, joint.link, (by or loops).multipliers
     if link is None:
-        rows = loops.on_second.get(joint.closure, []), multipliers.get(joint.closure, [])
+        on_second = loops.ends[joint.closure][1][1] if joint.closure in loops.found else []
+        rows = on_second, multipliers.get(joint.closure, [])
         return b.reaction_in_loop(*rows, [by.unit] if by and own else [], second)
     passing = [(one.through[link], multipliers[number]) for number, one in loops.found.items() if link in one.through]
     if by and not own and link in by.through:
@@ -298,10 +306,52 @@ def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tup
     return L, least
 
 
-def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
-    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
-    found, waiting, loads = Spread({}, {}), dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
-    S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
+def passed_inwards(ends: Ends, gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
+    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V."""
+    found, S = Spread({}, {}), [[0.0] * (i + 1) for i in range(len(gamma))]
+
+    def passed(link: Link, wrenches: c.Wrenches, loads: list[tuple[c.Wrenches, Columns]]) -> c.Wrenches:
+        nonlocal gamma, S
+        carried_on = int(link.on_link)
+        if modes := link.modes:
+            modal = modes.gains, modes.forces, loads, wrenches, gamma, S
+            found.V[modes], gamma, S, wrenches = f.spread(*modal)
+        if link.driven or link.watched:
+            found.through[link] = wrenches
+        if not link.gains:
+            return c.inwards(link.step, wrenches) if carried_on else []
+        given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
+        found.V[link], gamma, S, on_parent = c.spread(*given)
+        return on_parent
+
+    to_the_ground(ends, passed)
+    return found, gamma, S
+
+
+def jacobian(ends: Ends) -> dict[Link | Modes, c.Rows]:
+    """Return J^T of rows by what they move, per coordinate or shape a number for each row."""
+    found = dict[Link | Modes, c.Rows]()
+
+    def passed(link: Link, wrenches: c.Wrenches, loads: list[tuple[c.Wrenches, Columns]]) -> c.Wrenches:
+        if modes := link.modes:
+            found[modes] = c.along([columns for _, columns in loads], [given for given, _ in loads])
+        if not link.driven:
+            found[link] = c.along([link.step.S], [wrenches])
+        return c.inwards(link.step, wrenches) if link.on_link else []
+
+    to_the_ground(ends, passed)
+    return found
+
+
+def to_the_ground(
+    ends: Ends, passed: Callable[[Link, c.Wrenches, list[tuple[c.Wrenches, Columns]]], c.Wrenches]
+) -> None:
+    """Pass wrenches on frames to the ground, from leaves on.
+
+    passed: returns what a link passes to its parent of all wrenches on it; it has those that act at its frames, too,
+    each with the motion of its frame per rate of each shape.
+    """
+    waiting, loads = dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
 
     def receive(frame: Frame, wrenches: c.Wrenches) -> None:
         link = frame.carrier
@@ -313,19 +363,7 @@ def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -
         receive(frame, wrenches)
     while waiting:
         link = max(waiting, key=lambda link: link.depth)
-        wrenches, carried_on = waiting.pop(link), int(link.on_link)
-        if modes := link.modes:
-            modal = modes.gains, modes.forces, loads[link], wrenches, gamma, S
-            found.V[modes], gamma, S, wrenches = f.spread(*modal)
-        if link.driven or link.rubbed:
-            found.through[link] = wrenches
-        if link.gains:
-            given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
-            found.V[link], gamma, S, passed = c.spread(*given)
-        else:
-            passed = c.inwards(link.step, wrenches) if carried_on else []
-        receive(link.frame, passed)
-    return found, gamma, S
+        receive(link.frame, passed(link, waiting.pop(link), loads[link]))
 
 
 def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
@@ -333,7 +371,7 @@ def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
     powers = list[tuple[int, Any]]()
     for link in mechanism.links:
         if link.driven:
-            given = link.step, link.rest, link.acceleration, link.closing, link.coordinates.u
+            given = link.step, link.rest, link.acceleration, [*link.closing, *link.own], link.coordinates.u
             powers.append((link.book, t.driving_power(*given)))
         if modes := link.modes:
             powers.append((modes.book, f.damping_power(modes.body.damping, modes.u)))

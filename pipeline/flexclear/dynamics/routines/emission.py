@@ -1,8 +1,8 @@
 """LLVM code of routines, and of the function that runs a list of their calls.
 
 The function is ``evaluate(h, f, w, n, t, y, dy)`` like that of kernels: it evaluates the laws of time at t, then calls
-each code of the list whose address is in h (`memory`), and reports in n the status that is the list's first result. The
-list is four words: number of calls, addresses of their codes, addresses of their offsets, address of the results.
+each code of the list whose address is at a place in h (`memory`), and reports in n the status that is the list's first
+result. The list is four words: number of calls, addresses of their codes and of their offsets, address of the results.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ def routine_text(code: Code) -> str:
     return str(builder.module)
 
 
-def interpreter_text() -> str:
-    """Return the LLVM text of the function that runs a list of calls."""
+def interpreter_text(place: int) -> str:
+    """Return the LLVM text of the function that runs the list of calls at a place of the header."""
     function, builder = _begun(_EVALUATE)
     h, f, w, n, t, y, dy = function.args
     laws = ir.FunctionType(_WORD, _EVALUATE.args[:5]).as_pointer()
     builder.call(builder.inttoptr(_read(builder, h, m.PRESCRIBE), laws), [h, f, w, n, t])
-    head = builder.inttoptr(_read(builder, h, m.CALLS), _WORD.as_pointer())
+    head = builder.inttoptr(_read(builder, h, place), _WORD.as_pointer())
     count, codes, offsets, results = (_read(builder, head, k) for k in range(4))
     codes, offsets = (builder.inttoptr(one, _WORD.as_pointer()) for one in (codes, offsets))
     results = builder.inttoptr(results, _FLOAT.as_pointer())

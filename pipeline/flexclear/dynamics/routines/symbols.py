@@ -6,10 +6,11 @@ A condition on symbols is known only when the code runs. It is written `branch`,
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterator
 from typing import Any
+
+import numpy as np
 
 from flexclear.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape
 from flexclear.dynamics.specialise.trace import Trace
@@ -41,12 +42,12 @@ def _function(name: str, plain: Callable) -> Callable[..., Any]:
 
 
 sqrt, sin, cos, tan, exp, log, tanh = (
-    _function(name, getattr(math, name)) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")
+    _function(name, getattr(np, name)) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")
 )
 arctan2, nearest, copysign = (
-    _function("arctan2", math.atan2),
-    _function("round", round),
-    _function("copysign", math.copysign),
+    _function("arctan2", np.arctan2),
+    _function("round", np.round),
+    _function("copysign", np.copysign),
 )
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
+from flexclear.dynamics.compile.files import interpreted
 from flexclear.dynamics.compile.functions import function, place
-from flexclear.dynamics.compile.sources import DESCRIBED, WHOLE
+from flexclear.dynamics.compile.sources import WHOLE
 from flexclear.dynamics.effects import scheme_of
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.integrate.method import Method
@@ -29,6 +30,7 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
     address,
     call_list,
+    described_in_python,
     equations,
     has_routines,
     made,
@@ -147,6 +149,17 @@ class Engine:
         calls = call_list(self.model, self.h, self.specialised, rows, progress)
         return calls.loaded.interpreter, calls.words.ctypes.data
 
+    def connect_record(self, progress: Progress) -> None:
+        """Connect the list of calls that evaluates what the record has, for the selected rows."""
+        if INTERPRETED:
+            if not self.h[m.DESCRIBE]:
+                describe = described_in_python(self.model, interpreted[int(self.h[m.PRESCRIBE])])
+                interpreted[id(describe)], self.h[m.DESCRIBE] = describe, id(describe)
+            return
+        given = self.model, self.h, self.specialised, self.selected.tobytes(), progress
+        calls = call_list(*given, m.RECORD_CALLS)
+        self.h[m.DESCRIBE], self.h[m.RECORD_CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
+
     @property
     def staged(self) -> bool:
         """True when the engine can step together with others."""
@@ -172,8 +185,7 @@ class Engine:
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row, in this thread."""
-        if self.has_specialised_code:
-            self.h[m.DESCRIBE] = address(self.model, self.h, self.specialised, self.selected.tobytes(), DESCRIBED)
+        self.connect_record(silent)
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
         given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
         function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
@@ -279,7 +291,10 @@ def prepare(model: Model, progress: Progress) -> Engine:
     refuse_singular(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
-    return assemble(model, entry, METHODS[solver.integrator], mobility)
+    engine = assemble(model, entry, METHODS[solver.integrator], mobility)
+    if not mobility.redundant:
+        engine.connect_record(progress)
+    return engine
 
 
 def assemble(

@@ -2,11 +2,13 @@
 
 It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
 steps run a list of calls of routines if these know all parts of the mechanism, else kernels; all other evaluations are
-those of kernels then. The topology alone decides, so that equal scenes give equal bytes.
+those of kernels then. A list always evaluates what the record has. The topology alone decides, so that equal scenes
+give equal bytes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Lock
@@ -16,7 +18,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
-from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.compile.sources import SPECIALISED, WHOLE
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
@@ -53,7 +55,7 @@ class SpecialisedCode:
     place: for stepping together with others; by default each engine takes its own steps.
     group: the group at that place, for the closure rows of its code.
     addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
-    lists: of calls of routines, by closure rows, where no code is specialised.  running: these with their own results.
+    lists: of calls of routines, by closure rows and their place in h.  running: these with their own results.
     rows: those for which the present integration has specialised steps.  They belong to one integration, since other
     integrations of this engine must not change a bit of this one.
     """
@@ -62,20 +64,20 @@ class SpecialisedCode:
     place: Place | None = None
     group: LaneGroup | None = None
     addresses: dict[tuple[bytes, str], int] = field(default_factory=dict)
-    lists: dict[bytes, LoadedList] = field(default_factory=dict)
-    running: dict[bytes, ListInstance] = field(default_factory=dict)
+    lists: dict[tuple[bytes, int], LoadedList] = field(default_factory=dict)
+    running: dict[tuple[bytes, int], ListInstance] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
 
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
-    """Return the sources of a model's evaluation and description, by name, with all closure rows: the longest code.
+    """Return the sources of a model's evaluation, by name, with all closure rows: the longest code.
 
     Steps that solve for all rows are specialised as well; for redundant rows that is decided later.
     """
     if INTERPRETED:
         return sources.kernels(model.parts)
     topology = topology_of(model.arrays, model.arrays.h)
-    names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)
+    names = (WHOLE,) if mobility.redundant else (WHOLE, SPECIALISED)
     served = has_routines(model)
     return {name: sources.specialised(model.parts, topology, name, routines=served) for name in names}
 
@@ -105,20 +107,38 @@ def has_routines(model: Model) -> bool:
 
 
 def call_list(
-    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
+    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent, where: int = m.CALLS
 ) -> ListInstance:
-    """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
+    """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows.
+
+    where: the place in h of its address, of which another list has another one (`mechanics.of_topology`).
+    """
     from flexclear.dynamics.mechanics.of_topology import list_of  # here: they import the compiler
     from flexclear.dynamics.routines.store import stored
 
-    if rows not in code.running:
-        if rows not in code.lists:
-            parts, topology = model.parts, topology_of(model.arrays, selected(model, h, rows))
+    of = rows, where
+    if of not in code.running:
+        if of not in code.lists:
+            given = model.parts, topology_of(model.arrays, selected(model, h, rows)), where
             with _making:
-                key = repr((parts, topology)).encode()
-                code.lists[rows] = stored(key, lambda: list_of(parts, topology), partial(progress, None))
-        code.running[rows] = code.lists[rows].instance(h)
-    return code.running[rows]
+                key = repr(given).encode()
+                code.lists[of] = stored(key, lambda: list_of(*given), partial(progress, None), where)
+        code.running[of] = code.lists[of].instance(h)
+    return code.running[of]
+
+
+def described_in_python(model: Model, laws: Callable) -> Callable:
+    """Return a function that Python evaluates in place of the list of the record; laws: evaluates the laws of time."""
+    from flexclear.dynamics.mechanics.of_topology import list_of
+    from flexclear.dynamics.routines.numbers import Numbers
+
+    def describe(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, y: int, dy: int) -> None:
+        laws(h, f, w, n, t)
+        calls = Numbers(h, f, w, n, int(y), int(dy))
+        list_of(model.parts, topology_of(model.arrays, h), m.RECORD_CALLS, calls)
+        n[m.EVALUATION], n[m.ABRIDGED], n[m.STATE] = calls.report, 1, y
+
+    return describe
 
 
 def selected(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:

@@ -6,7 +6,6 @@ An evaluation takes milliseconds, a thousand times as long as compiled code: eno
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,11 +13,11 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
-from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.run.evaluation.engine import Engine, assemble
+from flexclear.dynamics.run.evaluation.specialised_code import described_in_python
 
 
 @dataclass(frozen=True)
@@ -56,13 +55,12 @@ class PythonEngine(Engine):
 def uncompiled(model: Model, mobility: Mobility) -> Engine:
     """Return an engine for the start of a model's run, without compilation."""
     method = METHODS[model.scene.solver.integrator]
-    return assemble(model, Uncompiled({}, _kernels(model.parts)), method, mobility, PythonEngine)
+    return assemble(model, Uncompiled({}, _kernels(model)), method, mobility, PythonEngine)
 
 
-@cache
-def _kernels(parts: Parts) -> SimpleNamespace:
-    calls = SimpleNamespace()
-    for name, kernel, source in sources.for_python(parts):
+def _kernels(model: Model) -> SimpleNamespace:
+    calls = SimpleNamespace(describe=described_in_python(model, lambda *given: calls.laws(*given)))
+    for name, kernel, source in sources.for_python(model.parts):
         scope: dict[str, Any] = {"calls": calls}
         exec(source, scope)
         setattr(calls, name, scope[kernel])
