@@ -44,7 +44,7 @@ def of_table(table: Any, **off: float) -> Evaluated:
 
 
 def of_rods(table: Any) -> Evaluated:
-    return evaluated(tabulated(Scene.model_validate(table), True))
+    return evaluated(tabulated(Scene.model_validate(table)))
 
 
 def of_scene(name: str) -> Evaluated:

@@ -22,7 +22,6 @@ from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.routines.store import load
 from flexclear.dynamics.run.evaluation import engine, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
@@ -83,7 +82,6 @@ def silent_text(text: str) -> None:
 def assert_alike(found: Evaluated) -> None:
     """Rates of positions, speeds and ledger; residuals, rates and pivots of the loops; the report."""
     model, h, (w, n) = found.model, found.h, by_routines(found)
-    assert has_routines(model)
     rates, speeds = w[h[m.SLOPES] :][: model.ny], model.speeds
     for part in (slice(speeds.start), speeds, slice(speeds.stop, None)):
         assert apart(rates[part], found.rates[part].astype(float)) < ROUNDING
@@ -103,13 +101,13 @@ def assert_alike(found: Evaluated) -> None:
 
 @pytest.mark.parametrize("name", TREES)
 def test_trees_move_as_by_kernels(name: str) -> None:
-    assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]), True)))
+    assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]))))
 
 
 @pytest.mark.parametrize("name", [name for name in BENT if "friction" not in name])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_flexible_bodies_move_as_by_kernels(name: str) -> None:
-    assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]), True)))
+    assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]))))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -168,7 +166,7 @@ def bent(number: int) -> Model:
     given = {"children": children, "closed": str(random.choice(["", "spherical", "revolute"]))}
     angles = tuple((turned * random.uniform(-1.2, 1.2, size=3)).tolist())
     scene = bending(references, kinds, angles, **given, driven=driven, stiffening=stiffening)
-    return tabulated(Scene.model_validate(scene), True)
+    return tabulated(Scene.model_validate(scene))
 
 
 @pytest.mark.parametrize("number", range(20))
@@ -192,7 +190,7 @@ def test_rounding_does_not_grow_with_the_distance_from_the_origin() -> None:
 @pytest.mark.parametrize("coaxial", [True, False])
 def test_coordinates_that_move_no_mass_are_noticed(coaxial: bool) -> None:
     with np.errstate(invalid="ignore"):
-        found = evaluated(tabulated(Scene.model_validate(massless(coaxial)), True))
+        found = evaluated(tabulated(Scene.model_validate(massless(coaxial))))
     assert by_routines(found)[1][m.EVALUATION] == found.report == (m.NOT_POSITIVE if coaxial else m.OK)
 
 

@@ -39,8 +39,7 @@ class FlexibleBodies:
     deform(d): X and U to the interface basis, before all else.  site(d, s): motion of a frame, returns its arm from the
     link's origin.  inboard(d, i, ...): from the frame of a link's inboard joint to the link's own (see `ports`).
     inertia(d): spatial inertias, wrenches and modal forces, for zero modal accelerations. mass_matrix(d): modal blocks,
-    right after `inertia`.  port_load(d, i): load of a link on moving shapes of its parent.  modal_forces(d):
-    generalised forces of the modes. modal_rates(d, dy): modal accelerations into the state's rates.
+    right after `inertia`.  modal_rates(d, dy): modal accelerations into the state's rates.
     """
 
     deform: Callable = nothing
@@ -48,8 +47,6 @@ class FlexibleBodies:
     inboard: Callable = _same_frame
     inertia: Callable = nothing
     mass_matrix: Callable = nothing
-    port_load: Callable = nothing
-    modal_forces: Callable = nothing
     modal_rates: Callable = nothing
 
 
@@ -95,14 +92,6 @@ def make_inertia(tree: Any) -> Callable:
 
 
 @kernel
-def carry(d, i, k):
-    """Store the momentum of the subtree of link i that moves with column k."""
-    tree, column, momentum = d.inertia[i], d.columns[k], d.momenta[k]
-    omega, v, c = column.angular, column.linear, tree.moment
-    momentum.angular = add(turn_symmetric(at6(tree.inertia, 0), omega), cross(c, v))
-    momentum.linear = add(scale(tree.mass, v), cross(omega, c))
-
-
 @kernel
 def apply_wrench(d, s, moment, force):
     """Apply a wrench (moment about the kernels' origin, force; world) to the link of site s, and to its modes."""

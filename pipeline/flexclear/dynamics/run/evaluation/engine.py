@@ -32,7 +32,6 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     call_list,
     described_in_python,
     equations,
-    has_routines,
     made,
 )
 from flexclear.scene.loads import SampledPid
@@ -139,15 +138,9 @@ class Engine:
             self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
         self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
         if not self.h[m.RATES]:
-            self.h[m.RATES], self.h[m.CALLS] = self._listed(rows, silent)
+            calls = call_list(self.model, self.h, known, rows)
+            self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
         self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
-
-    def _listed(self, rows: bytes, progress: Progress) -> tuple[int, int]:
-        """Return the address of the interpreter, and of the list of calls for selected rows; of kernels without."""
-        if not has_routines(self.model):
-            return int(self.h[m.EVALUATE]), 0
-        calls = call_list(self.model, self.h, self.specialised, rows, progress)
-        return calls.loaded.interpreter, calls.words.ctypes.data
 
     def connect_record(self, progress: Progress) -> None:
         """Connect the list of calls that evaluates what the record has, for the selected rows."""
@@ -180,7 +173,7 @@ class Engine:
                 specialised.rows.append(rows)
             for met in specialised.rows:
                 if not address(self.model, self.h, specialised, met, progress=progress):
-                    self._listed(met, progress)
+                    call_list(self.model, self.h, specialised, met, progress)
         self.connect()
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
