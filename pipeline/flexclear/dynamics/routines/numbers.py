@@ -1,0 +1,58 @@
+"""Calls done at once, on numbers in memory, which may carry their changes (`specialise.dual`): no compiler is needed.
+
+An evaluation takes milliseconds, a thousand times as long as compiled code: enough for a start or a tangent, not for a
+run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from flexclear.dynamics import memory as m
+from flexclear.dynamics.routines.calls import (
+    MODES,
+    RATES,
+    RESULTS,
+    SCENE,
+    STATE,
+    WORK,
+    CallList,
+    Cell,
+    inline,
+    parted,
+)
+from flexclear.dynamics.routines.symbols import leaves, rebuilt
+from flexclear.dynamics.specialise import topology as topologies
+
+
+class Numbers(CallList):
+    """A list of calls that are not kept: each is done when it is appended.
+
+    Its numbers are those of NumPy, which divide by zero as compiled code does.  report: the first result.
+    """
+
+    def __init__(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, y: int, dy: int) -> None:
+        super().__init__()
+        self._h, self._report = h, np.zeros(1)
+        self._arrays = {SCENE: f, WORK: w, STATE: w[y:], RATES: w[dy:], RESULTS: self._report, MODES: n[n[m.MODE] :]}
+
+    def call(self, function: Callable, arguments: Any, into: Sequence[Cell] | None = None) -> Any:
+        """Return the results of a call; without the first of several, if cells are given to store that."""
+        given = [self._arrays[one.array][self._place(one)] if type(one) is Cell else one for one in leaves(arguments)]
+        with inline(), np.errstate(all="ignore"):
+            first, rest = parted(function(*rebuilt(arguments, iter(given))), into)
+        for cell, value in zip(into or (), leaves(first), strict=True):
+            self._arrays[cell.array][self._place(cell)] = value
+        return rest
+
+    def _place(self, cell: Cell) -> int:
+        stretch, inside = topologies.split(cell.index)
+        return int(inside if stretch < 0 else self._h[stretch] + inside)
+
+    @property
+    def report(self) -> int:
+        """What the list reports of its evaluation."""
+        return int(self._report[0])
