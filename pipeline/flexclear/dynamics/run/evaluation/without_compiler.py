@@ -5,6 +5,8 @@ An evaluation takes milliseconds, a thousand times as long as compiled code: eno
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from types import SimpleNamespace
@@ -18,7 +20,7 @@ from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.run.evaluation.engine import Engine, assemble
+from flexclear.dynamics.run.evaluation.engine import MAKER, Engine, assemble
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,16 @@ def uncompiled(model: Model, mobility: Mobility) -> Engine:
     """Return an engine for the start of a model's run, without compilation."""
     method = METHODS[model.scene.solver.integrator]
     return assemble(model, Uncompiled({}, _kernels(model.parts)), method, mobility, PythonEngine)
+
+
+@contextmanager
+def without_compiler() -> Iterator[None]:
+    """Let all engines that are prepared during the context be evaluated in Python."""
+    token = MAKER.set(uncompiled)
+    try:
+        yield
+    finally:
+        MAKER.reset(token)
 
 
 @cache
