@@ -56,7 +56,6 @@ def _of_chain(name: str, links: int) -> Record:
         "links": links,
         "apart": float(np.abs(theirs - ours).max() / np.abs(theirs).max()),
         "evaluations": evaluations,
-        "way": "articulated inertias" if engine.model.parts.articulated else "mass matrix",
         **_times(peer, engine, straight, state, repeat),
     }
 
@@ -107,10 +106,8 @@ def show(records: list[Record]) -> str:
 
 
 def _columns(what: str) -> Columns:
-    """Return the columns over numbers of loops or links; links add the kernels' method and a run's evaluations."""
-    chains = what == "links"
-    way: Columns = {"method": lambda r: r["way"]} if chains else {}
-    cost: Columns = {"evaluations in 0.2 s": lambda r: str(r["evaluations"])} if chains else {}
+    """Return the columns over numbers of loops or links; links add a run's evaluations."""
+    cost: Columns = {"evaluations in 0.2 s": lambda r: str(r["evaluations"])} if what == "links" else {}
     return {
         "program": lambda r: r["by"],
         what: lambda r: str(r[what]),
@@ -119,7 +116,6 @@ def _columns(what: str) -> Columns:
         "ratio": lambda r: f"{r['straight_ratio']:.1f}" if "straight" in r else "",
         "kernels [us]": lambda r: spread(r["ours"], "us", 2),
         "ratio ": lambda r: f"{r['ratio']:.1f}",
-        **way,
         "accelerations differ by": lambda r: short(r["apart"]),
         **cost,
     }

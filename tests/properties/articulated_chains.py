@@ -1,4 +1,4 @@
-"""Chains and trees of rods, and their accelerations with either way of factoring the mass matrix, made in Python."""
+"""Chains and trees of rods, and their accelerations, made in Python."""
 
 import json
 from functools import cache
@@ -6,13 +6,11 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-import pytest
 import xarray as xr
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import sources
 from flexclear.dynamics.model import initial
-from flexclear.dynamics.model import model as modelling
 from flexclear.dynamics.model.arrays import WorkSpace, _work_lengths
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
@@ -186,11 +184,9 @@ def reduced(scene: Scene) -> dict[str, xr.Dataset]:
     }
 
 
-def tabulated(scene: Scene, articulated: bool) -> Model:
-    """The model with a given way of factoring the mass matrix."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(modelling, "is_deep_tree", lambda numbering: articulated)
-        return tabulate(build(scene, reduced(scene)))
+def tabulated(scene: Scene) -> Model:
+    """The model of a scene of `rods` or `bending`."""
+    return tabulate(build(scene, reduced(scene)))
 
 
 def right_hand_side(model: Model) -> Any:

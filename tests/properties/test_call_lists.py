@@ -105,7 +105,7 @@ def test_another_length_has_no_other_code() -> None:
 
 def test_numbers_of_a_scene_are_inputs() -> None:
     """A list runs with other masses, and gravity, as one that is made for them."""
-    models = [tabulated(Scene.model_validate(rods(5) | more), True) for more in ({}, {"load": GRAVITY})]
+    models = [tabulated(Scene.model_validate(rods(5) | more)) for more in ({}, {"load": GRAVITY})]
     models[1].arrays.f[models[1].arrays.h[m.LINK_NUMBERS.at] + m.LINK_NUMBERS.size] *= 3.0
     lists = [list_of(model.parts, topology_of(model.arrays, model.arrays.h)) for model in models]
     assert [call.offsets for call in lists[0].calls] == [call.offsets for call in lists[1].calls]

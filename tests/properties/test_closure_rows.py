@@ -1,6 +1,6 @@
 """What kernels do with closure rows in threes is what dense algebra does with all of them at once."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -9,6 +9,8 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.model import selection, tree
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.tree_factor import mass_factor
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE
@@ -45,7 +47,7 @@ def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
     assert found.report == m.OK
     assert model.arrays.table(m.CLOSURES, h)["n_kept"].tolist() == rows
     J, S = (selection.dense_rows(model, h, w[h[place] :][: h[m.JACOBIAN_SIZE]]) for place in (m.JACOBIAN, m.SPREAD))
-    L = dense_factor(model.arrays.table(m.ENVELOPE), w[h[m.MASS] :])
+    L = mass_factor(cast("Engine", found))
     C = dense_factor(model.arrays.table(m.CLOSURE_ENVELOPE, h)[: len(J)], w[h[m.SCHUR] :])
     bias = w[h[m.GAMMA] :][selection.selected_indices(model, h)]
     accelerations = w[h[m.DU] :][: model.nv]

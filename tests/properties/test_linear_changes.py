@@ -11,7 +11,6 @@ from flexclear.dynamics.compile import sources
 from flexclear.dynamics.linear.bench import Bench, balance, hold
 from flexclear.dynamics.linear.tangent import Tangent, damping, stiffness, tangent
 from flexclear.dynamics.linear.vibrations import vibrations
-from flexclear.dynamics.model import model as modelling
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
@@ -73,16 +72,7 @@ def test_forces_in_the_papers_mechanism_change_as_their_differences_say(name: st
 def test_forces_of_a_deep_tree_change_as_their_differences_say(driven: tuple[int, ...]) -> None:
     """Its bias is summed up of wrenches, which articulated inertias leave next to columns and origins."""
     bench, at = pose(Scene.model_validate(rods(16, ("revolute", "universal"), driven=driven)))
-    assert bench.model.parts.articulated
     agrees(bench, at)
-
-
-def test_a_deep_tree_vibrates_as_with_its_mass_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
-    table = Scene.model_validate(rods(16, plane=True))
-    deep = analyses.frequencies(table, {}, silent).frequency.values
-    monkeypatch.setattr(modelling, "is_deep_tree", lambda numbering: False)
-    shallow = analyses.frequencies(table, {}, silent).frequency.values
-    assert deep == pytest.approx(shallow, rel=1e-9)
 
 
 def test_friction_at_rest_is_a_strong_damper() -> None:
@@ -137,7 +127,6 @@ def arm(count: int) -> Scene:
 def test_an_arm_that_gravity_does_not_move_rests_anywhere() -> None:
     """Rounding of its weights is no stiffness, which the size of all that balances says."""
     bench, q = hold(arm(16), {}, silent, None, None, False)
-    assert bench.model.parts.articulated
     found = vibrations(bench, tangent(bench, q))
     assert found.free == 16
     assert found.stable

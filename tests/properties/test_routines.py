@@ -25,7 +25,6 @@ from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.routines.store import load
 from flexclear.dynamics.run.evaluation import engine, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
@@ -100,7 +99,6 @@ def silent_text(text: str) -> None:
 
 def assert_alike(found: Evaluated) -> None:
     """Rates of positions, speeds and ledger; residuals, rates and pivots of the loops; the report."""
-    assert has_routines(found.model)
     for w, n in (by_routines(found), by_numbers(found)):
         assert_same(found, w, n)
 
@@ -126,13 +124,13 @@ def assert_same(found: Evaluated, w: np.ndarray, n: np.ndarray) -> None:
 
 @pytest.mark.parametrize("name", TREES)
 def test_trees_move_as_by_kernels(name: str) -> None:
-    assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]), True)))
+    assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]))))
 
 
 @pytest.mark.parametrize("name", [name for name in BENT if "friction" not in name])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_flexible_bodies_move_as_by_kernels(name: str) -> None:
-    assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]), True)))
+    assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]))))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -191,7 +189,7 @@ def bent(number: int) -> Model:
     given = {"children": children, "closed": str(random.choice(["", "spherical", "revolute"]))}
     angles = tuple((turned * random.uniform(-1.2, 1.2, size=3)).tolist())
     scene = bending(references, kinds, angles, **given, driven=driven, stiffening=stiffening)
-    return tabulated(Scene.model_validate(scene), True)
+    return tabulated(Scene.model_validate(scene))
 
 
 @pytest.mark.parametrize("number", range(20))
@@ -215,7 +213,7 @@ def test_rounding_does_not_grow_with_the_distance_from_the_origin() -> None:
 @pytest.mark.parametrize("coaxial", [True, False])
 def test_coordinates_that_move_no_mass_are_noticed(coaxial: bool) -> None:
     with np.errstate(invalid="ignore"):
-        found = evaluated(tabulated(Scene.model_validate(massless(coaxial)), True))
+        found = evaluated(tabulated(Scene.model_validate(massless(coaxial))))
     for evaluate in (by_routines, by_numbers):
         assert evaluate(found)[1][m.EVALUATION] == found.report == (m.NOT_POSITIVE if coaxial else m.OK)
 

@@ -154,11 +154,11 @@ class Room:
 # fmt: off
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
-    N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
+    N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS,
     N_LOAD_NUMBERS, N_CHANGES, F_CHANGE, W_CHANGE,
-) = _sizes("n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
-    "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
+) = _sizes("n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger "
+    "n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
     "n_loads n_internal n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_load_numbers n_changes "
     "f_change w_change",
 )
@@ -185,10 +185,8 @@ BASIS = topology("mode shape")  # entries of the interface basis, shape after sh
 MOMENTS = topology("mode")  # mode i of MOMENT_VALUES, row after row
 MOMENT_ROWS = topology("end")  # per body and row (3k + l) n + j of these: index in MOMENTS after its last one
 PORTS = topology("flex column shapes")  # column, shapes: the first ones, of moving shapes
-PAIRS = topology("momentum column entry")  # entry: index in the mass matrix's envelope
-KNOWN_PAIRS = topology("momentum column drive coordinate")
-#: rows of the mass matrix, or of the modal blocks that articulated inertias factor; rows of joint coordinates then hold
-#: 1/sqrt(D). first: column; origin: index of column 0, which may lie before that of the first
+#: rows of the modal blocks that the elimination factors; rows of joint coordinates hold 1/sqrt(D). first: column;
+#: origin: index of column 0, which may lie before that of the first
 ENVELOPE = topology("first origin")
 #: threes: groups of three solved rows, adjacent in JACOBIAN and SPREAD and evaluated together; the last group may end
 #: with zeros.  coupling: index of its coupling, or -1; path0, n_path: of its links in PATHS
@@ -265,10 +263,10 @@ INTERFACE_X, INTERFACE_U = _stretches("interface_x:nv interface_u:nv")
 LINK_FRAMES, SITE_FRAMES = work(_FRAME, "n_links"), work(_FRAME, "n_sites")
 #: the motion subspace S of one joint: a twist per freedom, axes of its first frame
 SUBSPACE = work("angular:3 linear:3", "6")
-#: spatial inertia: mass, mass * centre, inertia about the kernels' origin (xx yy zz xy xz yz); of link, of subtree
-OWN, INERTIA = (work("mass moment:3 inertia:6", "n_links") for _ in range(2))
+#: spatial inertia of links: mass, mass * centre, inertia (xx yy zz xy xz yz), about the link's origin
+OWN = work("mass moment:3 inertia:6", "n_links")
 WRENCH = work("moment:3 force:3", "n_links")
-COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3", count) for count in ("columns", "columns", "nv"))
+COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3", count) for count in ("columns", "nv", "nv"))
 #: of each link, about its origin; arm: from the parent's origin: articulated inertia, which maps twists to wrenches by
 #: (turning mixed; mixed^T moving); a wrench; an acceleration; the wrench that its own accelerations need
 #: (`equations.articulated`)
@@ -280,8 +278,8 @@ TRANSMITTED = work("moments:3x3 forces:3x3", "n_links")
 #: each column about its link's origin, and the gain K of the factor for each coordinate
 LOCAL, GAIN = work("angular:3 linear:3", "columns"), work("moment:3 force:3", "nv")
 #: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
-BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _stretches(
-    "bias:nv+n_drives modal_bias:nv modal:25*most_modes scratch:27 mass:mass_size force:nv residual:n_closure_rows "
+MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _stretches(
+    "modal_bias:nv modal:25*most_modes scratch:27 mass:mass_size force:nv residual:n_closure_rows "
     "residual_rate:n_closure_rows gamma:n_closure_rows"
 )
 #: wrenches of the closure rows; then those of the couplings on their first joints

@@ -25,9 +25,7 @@ from flexclear.dynamics.bodies.modal_terms import (
     DRIFT,
     RATE,
     make_carrying,
-    modal_forces,
     of_mode,
-    port_load,
     spatial,
     spin,
     stiffness,
@@ -91,8 +89,11 @@ def of_each(body: Callable) -> Callable:
 
 
 def flexible_bodies(stiffening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]:
-    """Return the factory of the kernels of flexible bodies; its argument is the mass matrix module, `articulated` or
-    `composite`. `stiffening`: linear motion of frames, or with the part of `bodies.stiffening`."""
+    """Return the factory of the kernels of flexible bodies; its argument says about which points
+    (`equations.articulated`, `equations.observation.ABOUT_ORIGIN`).
+
+    stiffening: linear motion of frames, or with the part of `bodies.stiffening`.
+    """
     return partial(_flexible_bodies, stiffening)
 
 
@@ -276,4 +277,4 @@ def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
 
     mass_matrix, modal_inertia = map(of_each, (body_mass_matrix, body_modal_inertia))
     before = (deform, site, inboard, inertia, mass_matrix, modal_inertia)
-    return FlexibleBodies(*before, port_load, modal_forces, modal_rates, energies)
+    return FlexibleBodies(*before, modal_rates, energies)

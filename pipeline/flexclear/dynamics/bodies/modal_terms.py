@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.dynamics.bodies.rigid import carry
 from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import (
     add,
@@ -13,7 +12,6 @@ from flexclear.dynamics.vectors import (
     at6,
     cross,
     dot,
-    dot_wrench,
     scale,
     turn_symmetric,
 )
@@ -110,27 +108,3 @@ def make_carrying(tree: Any) -> tuple[Callable, Callable]:
                 d.mass[start + j] += value
 
     return carried, body_mass_matrix
-
-
-@kernel
-def port_load(d, i):
-    """Add the load of link i on the moving shapes of its flexible parent, through the port."""
-    p = d.links[i].carried_by
-    if p < 0:
-        return
-    port = d.ports[p]
-    body = d.flexes[port.flex]
-    for j in range(body.n_modes - body.n_held):
-        k, shape = port.column + j, body.c0 + body.n_held + j
-        carry(d, i, k)
-        add_twist(d.momenta[shape], d.momenta[k].angular, d.momenta[k].linear)
-        d.modal_bias[shape] += dot_wrench(d.wrench[i], d.columns[k])
-
-
-@kernel
-def modal_forces(d):
-    """Store the generalised forces of the modes."""
-    for b in range(d.n_flex):
-        body = d.flexes[b]
-        for j in range(body.c0, body.c0 + body.n_modes):
-            d.bias[j] = d.modal_bias[j]

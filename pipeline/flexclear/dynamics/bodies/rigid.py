@@ -44,9 +44,8 @@ class FlexibleBodies:
     deform(d): X and U to the interface basis, before all else.  site(d, s): motion of a frame, returns its arm from the
     link's origin.  inboard(d, i, ...): from the frame of a link's inboard joint to the link's own (see `ports`).
     inertia(d): spatial inertias, wrenches and modal forces, for zero modal accelerations. mass_matrix(d): modal blocks,
-    right after `inertia`.  modal_inertia(d): part of the modal accelerations in the wrenches. port_load(d, i): load of
-    a link on moving shapes of its parent.  modal_forces(d): generalised forces of the modes. modal_rates(d, dy): modal
-    accelerations into the state's rates.  energies(d, component): kinetic and elastic [J].
+    right after `inertia`.  modal_inertia(d): part of the modal accelerations in the wrenches. modal_rates(d, dy):
+    modal accelerations into the state's rates.  energies(d, component): kinetic and elastic [J].
     """
 
     deform: Callable = nothing
@@ -55,8 +54,6 @@ class FlexibleBodies:
     inertia: Callable = nothing
     mass_matrix: Callable = nothing
     modal_inertia: Callable = nothing
-    port_load: Callable = nothing
-    modal_forces: Callable = nothing
     modal_rates: Callable = nothing
     energies: Callable = _no_energy
 
@@ -110,15 +107,6 @@ def kinetic_energy(d, i):
     v = add(frame.velocity, cross(omega, turn(R, link.com)))
     J = congruence(R, at6(link.inertia, 0))
     return 0.5 * (link.mass * dot(v, v) + dot(omega, turn_symmetric(J, omega)))
-
-
-@kernel
-def carry(d, i, k):
-    """Store the momentum of the subtree of link i that moves with column k."""
-    tree, column, momentum = d.inertia[i], d.columns[k], d.momenta[k]
-    omega, v, c = column.angular, column.linear, tree.moment
-    momentum.angular = add(turn_symmetric(at6(tree.inertia, 0), omega), cross(c, v))
-    momentum.linear = add(scale(tree.mass, v), cross(omega, c))
 
 
 @kernel

@@ -74,8 +74,8 @@ class Composition:
 
     @property
     def tree(self) -> str:
-        """Name of the module that factors the mass matrix."""
-        return self.take(f"{DYNAMICS}.equations", "articulated" if self.parts.articulated else "composite")
+        """Name of the module that eliminates along the tree."""
+        return self.take(f"{DYNAMICS}.equations", "articulated")
 
     @property
     def forms(self) -> str:
@@ -173,19 +173,16 @@ def _right_hand_side(parts: Parts) -> Composition:
     return file
 
 
-def specialised(
-    parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False, routines: bool = True
-) -> str:
+def specialised(parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False) -> str:
     """Return the source of specialised code for one topology.
 
     name: of the right-hand side as steps call it, of that with all its side results, or of the recorded quantities.
-    exact: True for the same bits as in each of several lanes.  routines: True where these serve the mechanism, for
-    steps; else its kernels do.
+    exact: True for the same bits as in each of several lanes.
     """
     if name == SPECIALISED:
         longest = "LONGEST" if exact else "LONGEST_STRAIGHT"
         used = [FILES, (PROGRAM, "llvm_text"), (PROGRAM, "NAME")]
-        return _of_topology(parts, topology, STRAIGHT, used, longest, routines, exact=exact)
+        return _of_topology(parts, topology, STRAIGHT, used, longest, exact=exact)
     file = _description(parts) if name == DESCRIBED else _equations(parts)
     for taken in ("llvm_text", "program", "NAME"):
         file.take(PROGRAM, taken)
@@ -195,18 +192,18 @@ def specialised(
     return file.text(function, _formulas(parts), FILES)
 
 
-def batched(parts: Parts, topology: Topology, lanes: int, *, routines: bool = True) -> str:
+def batched(parts: Parts, topology: Topology, lanes: int) -> str:
     """Return the source of the function that advances several steppers of one topology (`compile.lanes`)."""
     taken = [CALLS, (f"{DYNAMICS}.compile.lanes", "make_lanes"), BATCHED]
-    return _of_topology(parts, topology, LANES, taken, "LONGEST", routines, lanes=lanes)
+    return _of_topology(parts, topology, LANES, taken, "LONGEST", lanes=lanes)
 
 
-def tangent(parts: Parts, topology: Topology, *, routines: bool = True) -> str:
+def tangent(parts: Parts, topology: Topology) -> str:
     """Return the source of the right-hand side for one topology with its tangents."""
     taken, change = [CALLS, (f"{DYNAMICS}.fields", "data"), BATCHED, (PRESCRIBED, "make_law_changes")], ""
     if parts.harmonics:
         taken.append((f"{DYNAMICS}.drives.oscillation", change := "change_oscillation"))
-    return _of_topology(parts, topology, CHANGES, taken, "LONGEST_DIFFERENTIATED", routines, harmonics=change)
+    return _of_topology(parts, topology, CHANGES, taken, "LONGEST_DIFFERENTIATED", harmonics=change)
 
 
 def _of_topology(
@@ -215,16 +212,10 @@ def _of_topology(
     template: str,
     taken: list[tuple[str, str]],
     longest: str,
-    routines: bool,
     **values: object,
 ) -> str:
     """Return the source of code for steps; taken: modules and names that it imports; longest: name of its limit."""
     values["topology"], taken = _rows(topology), [*taken, (PROGRAM, longest)]
-    if not routines:
-        file = _equations(parts)
-        file.imports += [*taken[1:], (PROGRAM, "program")]
-        made = f"program({file.kernel}, TOPOLOGY, {longest})"
-        return file.text(template.format(made=made, **values), _formulas(parts), taken[0])
     taken += [("flexclear.dynamics.effects", "Parts"), (f"{DYNAMICS}.mechanics.of_topology", "program_of")]
     imports = "".join(f"from {module} import {name}\n" for module, name in sorted(taken))
     made = template.format(made=f"program_of(PARTS, TOPOLOGY, {longest})", **values)

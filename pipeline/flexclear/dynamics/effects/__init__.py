@@ -35,7 +35,6 @@ class Parts:
     surfaces, forms, frictions: of contacts.  loads: their types, with the structure of expressions.
     effects: names, each followed by the kinds of which its code is composed.  harmonics: True when a law of time has
     some.  load_kinks: True when loads have kinks.
-    articulated: True when the tree is so deep that articulated inertias factor its mass matrix.
     """
 
     joints: tuple[str, ...]
@@ -48,7 +47,6 @@ class Parts:
     flexible: bool = False
     harmonics: bool = False
     load_kinks: bool = False
-    articulated: bool = False
 
     @property
     def present(self) -> list[Effect]:

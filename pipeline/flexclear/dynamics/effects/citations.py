@@ -17,7 +17,7 @@ from flexclear.workflow.task import flatten
 #: folders of `dynamics` with a module for each part that a scene may name
 PARTS = ("contact.form", "contact.friction", "contact.normal", "contact.surfaces", "drives", "joints", "loads")
 #: of `dynamics`: what only some runs of a scene need, and what belongs to other commands and to the compiler
-SOMETIMES = ("equations.articulated", "linear", "run")
+SOMETIMES = ("linear", "run")
 NEVER = ("compile", "plan", "sensitivity", "specialise")
 #: modules of `integrate` that steps of every method use
 STEPS = ("adaptive", "norms", "runge_kutta", "stiffness", "within_step")

@@ -32,12 +32,10 @@ JOINT_FRICTION = Effect(
     topology={
         # site_a, site_b: of its frames; link: the link whose inboard joint it is, or -1; reversed: 1 when that link is
         # on the side of the first frame; closure: its closure, or -1
-        "rubbing": "site_a site_b link reversed closure entry0 n_entries momentum0 n_momenta column0 n_columns loop0 "
-        "n_loops bearing0 n_bearings",
+        "rubbing": "site_a site_b link reversed closure entry0 n_entries loop0 n_loops  bearing0 n_bearings",
         # bearings of these joints. kind: see `equations`; side, axis: of the frame; bristle: see CONTACTS
         "bearings": "joint kind law side axis bristle",
         "rubbing_entries": "coordinate column sign",  # coordinates that move it; prescribed ones after the free ones
-        "reaction_terms": "coordinate column",  # free coordinates whose acceleration enters the joint's reaction
         "reaction_loops": "closure sign part",  # closures that act beyond it
     },
     # radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per

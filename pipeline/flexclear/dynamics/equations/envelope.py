@@ -50,19 +50,6 @@ def factor(h, e, w, a, begin, end, threshold):
 
 
 @kernel
-def multiply(h, e, w, a, n):
-    """Overwrite a factor L with its matrix L L^T."""
-    for i in range(n - 1, -1, -1):
-        first, row = h[e + 2 * i], base(h, e, a, i)
-        for j in range(i, first - 1, -1):
-            other = base(h, e, a, j)
-            total = 1.0 / (w[row + i] * w[row + i]) if j == i else w[row + j] / w[other + j]
-            for k in range(max(first, h[e + 2 * j]), j):
-                total += w[row + k] * w[other + k]
-            w[row + j] = total
-
-
-@kernel
 def forward(h, e, w, a, begin, end, b):
     """Apply L^-1 to the vector in w from index b."""
     for i in range(begin, end):

@@ -340,8 +340,7 @@ def make_joint_friction(laws: tuple[Any, ...], closed: bool, tree: Any) -> Calla
     """Build joint_friction(d): it completes accelerations, multipliers and ledger by friction in joints.
 
     It runs after accelerations and multipliers and before the drives' forces.  laws: modules of the laws present
-    (`contact.friction`).  closed: True with closures.  tree: the module that factors the mass matrix,
-    `equations.articulated` or `equations.composite`.
+    (`contact.friction`).  closed: True with closures.  tree: `equations.articulated`.
     """
     unit_wrench = make_unit_wrench(choose(tuple(law.traction for law in laws)))
     forward, backward = tree.forward, tree.backward

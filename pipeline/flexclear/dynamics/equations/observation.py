@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ import numpy as np
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.bodies import rigid
 from flexclear.dynamics.choice import nothing
-from flexclear.dynamics.equations import composite
 from flexclear.dynamics.equations.kinematics import make_kinematics
 from flexclear.dynamics.equations.named_bodies import OF_BODIES, SIZE, put_bodies, put_frames
 from flexclear.dynamics.equations.prescribed_motion import prescribe
@@ -197,6 +197,37 @@ def foresee(d, rows, r, state, closed, states):
     return most > 0.0
 
 
+@kernel
+def _origin(d, i):
+    """Return the origin of link i from the kernels' origin, to which its inertia refers."""
+    return d.link_frames[i].origin
+
+
+@kernel
+def _demand_of(d, i, moment, force):
+    """Store the wrench that the accelerations of link i need, about the kernels' origin."""
+    wrench = d.wrench[i]
+    wrench.moment, wrench.force = moment, force
+
+
+@kernel
+def _column(d, k):
+    """Return angular and linear part of a column about the kernels' origin."""
+    return d.columns[k].angular, d.columns[k].linear
+
+
+#: inertia and wrenches about the kernels' origin, where `equations.articulated` has those about the links' own
+ABOUT_ORIGIN = SimpleNamespace(
+    origin=_origin,
+    demand_of=_demand_of,
+    column=_column,
+    localise=nothing,
+    localise_shape=nothing,
+    step=nothing,
+    shift=nothing,
+)
+
+
 def make_description(
     joints: tuple[Any, ...],
     flexible: Callable[[Any], rigid.FlexibleBodies] = rigid.all_rigid,
@@ -211,9 +242,9 @@ def make_description(
     couplings: subtracts gears' wrenches from their links (`effects.gears`); friction: of ideal joints, in closures
     (`effects.joint_friction`); the other arguments are those of `make_rates`.
     """
-    bodies = flexible(composite)  # wrenches about the kernels' origin
-    kinematics = make_kinematics(joints, composite, bodies)
-    forces = make_forces(composite, bodies, contacts, loads, stops)
+    bodies = flexible(ABOUT_ORIGIN)
+    kinematics = make_kinematics(joints, ABOUT_ORIGIN, bodies)
+    forces = make_forces(ABOUT_ORIGIN, bodies, contacts, loads, stops)
     modal_inertia, flexible_energy = bodies.modal_inertia, bodies.energies
 
     @kernel

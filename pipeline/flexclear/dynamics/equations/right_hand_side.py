@@ -1,7 +1,7 @@
 """The right-hand side: accelerations of all coordinates, composed from the parts present.
 
 Order: known motion, kinematics, inertia, contacts, then the tree from its leaves to the ground,
-mass matrix, closures, accelerations, and the forces that the drives supply.
+closures, accelerations, and the forces that the drives supply.
 """
 
 from __future__ import annotations
@@ -79,10 +79,9 @@ def make_rates(
 ) -> Callable:
     """Build the kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
 
-    joints: modules of the joint types.  tree: how the mass matrix is factored, the module `equations.articulated` or
-    `equations.composite`.  flexible: makes the kernels of the flexible bodies, of that.  contacts, loads, stops: the
-    kernels that apply them.  closures: kernels of all closures.  friction: of ideal joints, on accelerations and on
-    drives (`effects.joint_friction`).
+    joints: modules of the joint types.  tree: `equations.articulated`.  flexible: makes the kernels of the flexible
+    bodies, of that.  contacts, loads, stops: the kernels that apply them.  closures: kernels of all closures.
+    friction: of ideal joints, on accelerations and on drives (`effects.joint_friction`).
     """
     bodies = flexible(tree)
     kinematics = make_kinematics(joints, tree, bodies)

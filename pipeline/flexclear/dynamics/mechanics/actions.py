@@ -9,6 +9,7 @@ from typing import Any
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact.wear import LEDGER
+from flexclear.dynamics.loads.lookup import length
 from flexclear.dynamics.mechanics.contacts import stop, touch
 from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.loads import STATES, Law, act
@@ -16,7 +17,7 @@ from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link,
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Site
 from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
-from flexclear.dynamics.routines.calls import MODES, RATES, STATE, Cell, cells
+from flexclear.dynamics.routines.calls import MODES, RATES, SCENE, STATE, Cell, Span, cells
 
 #: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
 Gauge: Any = namedtuple("Gauge", "turning side axis sine_f sine_g cosine_f cosine_g")
@@ -113,7 +114,7 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
         given = (
             kind,
             int(row["follows"]),
-            tables.row(m.LOAD_NUMBERS, number[0], number[1] - number[0]),
+            _numbers(tables, name, *number),
             [Law(*tables.record("law", k)[:2]) for k in range(*law)],
             states,
             reading.gauged,
@@ -122,6 +123,15 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
         bends = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
         made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
     return made
+
+
+def _numbers(tables: Tables, name: str, first: int, end: int) -> list[Cell | Span]:
+    """Return the numbers of a load, then a span for each table that its expressions look up (`scene.formulas`)."""
+    looked_up = sorted({one for one in name.split() if ":" in one}, key=lambda one: int(one[1:].partition(":")[0]))
+    sizes = [length(tuple(map(int, one.split(":")[1:]))) for one in looked_up]
+    found = tables.row(m.LOAD_NUMBERS, first, end - first)
+    begins = [len(found) - sum(sizes[k:]) for k in range(len(sizes))]
+    return [*found[: begins[0] if begins else None], *(Span(SCENE, found[at].index) for at in begins)]
 
 
 def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[Any, tuple[Any, ...], list[Frame], list[Cell]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import inf
 from typing import Any, NamedTuple
 
 from flexclear.dynamics import memory as m
@@ -22,7 +23,7 @@ from flexclear.dynamics.routines.symbols import select
 
 @routine
 def status(reports: t.Numbers, sound: Any, least: Any, jammed: Any) -> tuple[Any]:
-    """Return the report of an evaluation, from those of `trees.eliminate`, `closures.cholesky` and `bearings.loads_of`.
+    """Return the report of an evaluation, from those of `trees.eliminate`, `closures.cholesky` and `loads_of`.
 
     reports: of a sound evaluation, of a jammed mechanism, of a singular pose, of massless coordinates.
     """
@@ -212,7 +213,8 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
     places = [one for joint in mechanism.rubbing for one in joint.bearings]
     loads, bends = [one.load for one in places], [cell for one in places for cell in one.bends]
     reactions = reactions_of(mechanism, loops, list(zip(influences, of_bearing, strict=True)))
-    jammed = calls.store([*loads, *bends], b.loads_of, bearings, *reactions)
+    found, kinks, jammed = loads_of(bearings, *reactions, calls)
+    calls.write([*loads, *bends], [*found, *kinks])
 
     for moved in moving(mechanism):
         V = [by.forces.get(moved, [0.0] * len(moved.forces)) for by in influences]
@@ -227,6 +229,34 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
             link.closing.append(([wrench], [load]))
     powers = [b.lost(*one) for one in zip(loads, losses, strict=True)]
     return [(joint.book, power) for joint, power in zip(of_bearing, powers, strict=True)], jammed
+
+
+def loads_of(
+    bearings: Sequence[tuple[Any, Any, Any]],
+    smooth: Sequence[Wrench],
+    influence: Sequence[Sequence[Wrench]],
+    calls: CallList,
+) -> tuple[list[Any], list[Any], Any]:
+    """Return the normal forces of all bearings, their parts with kinks, and 1 where friction jams them, else 0.
+
+    smooth: reaction of each bearing's joint without friction.  influence: per normal force of each bearing.
+    """
+
+    def pressed(loads: t.Numbers, share: Any) -> list[Any]:
+        return [
+            b.pressed(*one, R, parts, loads, share) for one, R, parts in zip(bearings, smooth, influence, strict=True)
+        ]
+
+    def pursue(state: Any) -> tuple[Any, Any]:
+        """Correct the loads once by Newton's method."""
+        rows, (loads, share, *_) = list[t.Numbers](), state
+        for e, (load, (size, _, slopes)) in enumerate(zip(loads, pressed(loads, share), strict=True)):
+            rows.append([*slopes[:e], t.added(1.0, slopes[e]), *slopes[e + 1 :], b.excess(load, size)])
+        return b.corrected(*b.solution(rows), without, *state)
+
+    without = [b.pressed(*one, R, [], [], 0.0)[0] for one, R in zip(bearings, smooth, strict=True)]
+    loads, *_, jammed = calls.repeat(pursue, (without, 1.0, 0.0, inf, 0.0, 0.0))
+    return loads, [bend for _, bends, _ in pressed(loads, 1.0) for bend in bends], jammed
 
 
 def moving(mechanism: Mechanism) -> list[Link | Modes]:

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 from flexclear.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.dynamics.mechanics.bushings import bushing
 from flexclear.dynamics.mechanics.coordinates import Along, along
+from flexclear.dynamics.mechanics.lookup import curve, surface
 from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, carried, on_both
 from flexclear.dynamics.mechanics.vectors import UNIT, ZERO, Matrix, Vector, Wrench, dot
 from flexclear.dynamics.routines import symbols
-from flexclear.dynamics.routines.calls import routine
+from flexclear.dynamics.routines.calls import Indexed, routine
 from flexclear.dynamics.routines.symbols import branch, larger, select, shared, smaller, sqrt
 from flexclear.scene.expression import BENT, fold
 from flexclear.scene.formulas import operands
@@ -29,8 +30,8 @@ class Law(NamedTuple):
 class Given(NamedTuple):
     """What a load may depend on. R_WL: axes of the components of a vector.
 
-    coordinates: that along which the load acts, then others that it measures.  read: frames and coordinates that an
-    expression names.
+    numbers: the load's own; then a span for each table.  coordinates: that along which the load acts, then others that
+    it measures.  read: frames and coordinates that an expression names.
     """
 
     numbers: Numbers
@@ -196,6 +197,10 @@ def evaluated(given: Given, formula: str) -> tuple[list[Any], list[Any]]:
     def apply(token: str, values: list[Any]) -> Any:
         if token in BENT:
             bends.append(values[0] - values[1] if len(values) == 2 else values[0])
+        if ":" in token:
+            table, *levels = map(int, token[1:].split(":"))
+            spans = [one for one in given.numbers if isinstance(one, Indexed)]
+            return (curve, surface)[len(levels) - 1](spans[table], *levels, *values)
         exponent = int(token[1:]) if token[0] == "^" and token[1:] else 0
         if exponent:
             product = reduce(mul, values * abs(exponent))

@@ -1,4 +1,4 @@
-"""Index tables of the equations: entries of the mass matrix, envelopes, supports of the closures."""
+"""Index tables of the equations: envelopes, supports of the closures."""
 
 from __future__ import annotations
 
@@ -14,61 +14,26 @@ from flexclear.dynamics.model.mechanism import Closure
 from flexclear.dynamics.model.numbering import Numbering
 
 
-def mass_entries(numbering: Numbering, articulated: bool) -> dict[Any, Any]:
-    """Return the tables PAIRS, KNOWN_PAIRS and ENVELOPE.
-
-    An entry of the mass matrix is the momentum of one coordinate (of all that it moves) times the column of a
-    coordinate nearer to the ground.  Articulated inertias store a number per coordinate of a joint instead, and behind
-    these the entries between the modes of each body.
-    """
-    products: list[tuple[int, int, int, int]] = []  # momentum, column, their coordinates
-    for i in range(1, len(numbering.mechanism.links)):
-        products += _port_products(numbering, i)
-        if articulated:
-            continue
-        own, above = numbering.coordinates[i], numbering.route(i - 1)
-        for n, c in enumerate(own):
-            products += [(c, d, c, d) for d in own[: n + 1]]
-            products += [(c, col, c, d) for d, col in above]
-        modal = numbering.modal_coordinates.get(i, ())
-        products += [(c, col, c, d) for c in modal for d, col in numbering.joint_route(i)]
+def mass_entries(numbering: Numbering) -> dict[Any, Any]:
+    """Return the table ENVELOPE: a number per coordinate of a joint, and behind these the entries between the modes of
+    each body."""
     first = list(range(numbering.nv))
-    for _, _, c, d in products:
-        if c < numbering.nv and d < numbering.nv:
-            first[max(c, d)] = min(first[max(c, d)], c, d)
+    for i in range(1, len(numbering.mechanism.links)):
+        if numbering.port_of(i - 1) >= 0:  # a carried link couples all moving shapes
+            moving = numbering.moving(numbering.sites[i - 1].link)
+            for c in moving:
+                first[c] = min(first[c], *moving)
     for link, modes in numbering.modal_coordinates.items():
         # stiffness couples held and moving shapes (`projection`), and so does mass where the latter move the body
         if numbering.bases[link].held or flexible_bodies.coupled(numbering.mechanism, link):
             for c in numbering.moving(link):
                 first[c] = min(first[c], modes.start)
     modal_rows = {c for modes in numbering.modal_coordinates.values() for c in modes}
-    start, rows = numbering.nv if articulated else 0, []
+    start, rows = numbering.nv, []
     for i, f in enumerate(first):
-        if articulated and i not in modal_rows:
-            rows.append((i, 0))
-            continue
-        rows.append((f, start - f))
-        start += i - f + 1
-    if articulated:
-        return {m.PAIRS: [], m.KNOWN_PAIRS: [], m.ENVELOPE: rows}
-    pairs, known = [], []
-    for momentum, col, c, d in products:
-        if c < numbering.nv and d < numbering.nv:
-            i, j = max(c, d), min(c, d)
-            pairs.append((momentum, col, rows[i][1] + j))
-        elif c < numbering.nv or d < numbering.nv:
-            pair = (max(c, d) - numbering.nv, min(c, d))
-            known.append((momentum, col, *pair))
-    return {m.PAIRS: pairs, m.KNOWN_PAIRS: known, m.ENVELOPE: rows}
-
-
-def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, int]]:
-    """Return the entries between the moving shapes of a flexible parent that come from the link i which it carries."""
-    port = numbering.port_of(i - 1)
-    if port < 0:
-        return []
-    moving, first = numbering.moving(numbering.sites[i - 1].link), numbering.ports[port].column
-    return [(first + j, first + k, moving[j], moving[k]) for j in range(len(moving)) for k in range(j + 1)]
+        rows.append((f, start - f) if i in modal_rows else (i, 0))
+        start += i - f + 1 if i in modal_rows else 0
+    return {m.ENVELOPE: rows}
 
 
 def closures(

@@ -1,4 +1,4 @@
-"""Tables of ideal joints with friction: bearings, coordinates that move them, and terms of their reactions."""
+"""Tables of ideal joints with friction: bearings, coordinates that move them, and closures in their reactions."""
 
 from __future__ import annotations
 
@@ -50,11 +50,8 @@ def guards(mechanism: Mechanism) -> Iterator[Guard]:
 
 
 def fill(filling: Filling) -> dict[str, Any]:
-    """Tabulate the joints with friction and their bearings.
-
-    Articulated inertias give the wrench of a joint without terms of reactions.
-    """
-    numbering, closures, articulated = filling.numbering, filling.closures, filling.parts.articulated
+    """Tabulate the joints with friction and their bearings."""
+    numbering, closures = filling.numbering, filling.closures
     mechanism, laws = numbering.mechanism, filling.parts.kinds("joint_friction")
     pairs = [(c, part, *both) for c, one in enumerate(closures) for part, both in enumerate(one.ends)]
     ends = [(c, part, numbering.site(a), numbering.site(b)) for c, part, a, b in pairs]
@@ -66,11 +63,9 @@ def fill(filling: Filling) -> dict[str, Any]:
         link, reverse = _link(mechanism, name)
         closure = next((c for c, one in enumerate(closures) if one.name == name), -1)
         entries = uncommon(closure_route(numbering, *sites))
-        momenta, columns, loops = _reaction(numbering, link, ends, articulated) if link >= 0 else ([], [], [])
+        loops = _loops_beyond(numbering, link, ends) if link >= 0 else []
         ranges = (
             *_added(tables["rubbing_entries"], entries),
-            *_added(tables["reaction_terms"], momenta),
-            *_added(tables["reaction_terms"], columns),
             *_added(tables["reaction_loops"], loops),
         )
         where = len(tables["bearings"]), len(BEARINGS[joint.type])
@@ -111,10 +106,8 @@ def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
     return bearings[-1] if bearings else (-1, False)
 
 
-def _reaction(
-    numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool
-) -> tuple[Rows, Rows, Rows]:
-    """Return the terms of the reaction of a link's joint: momenta, columns, and closures beyond the joint.
+def _loops_beyond(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]]) -> Rows:
+    """Return the closures that act beyond a link's joint, as rows of reaction_loops.
 
     ends: (closure, part, first site, second site) of all closures; a coupling has two parts.
     """
@@ -123,16 +116,9 @@ def _reaction(
     for i in range(link + 1, len(mechanism.links)):
         if mechanism.links[i].branch.parent in beyond:
             beyond.add(i)
-    momenta: Rows = [
-        (c, c)
-        for i in sorted(beyond)
-        for c in (*numbering.coordinates[i], *numbering.modal_coordinates.get(i, ()))
-        if c < numbering.nv and not articulated
-    ]
-    columns: Rows = [(c, col) for c, col in numbering.route(link - 1) if c < numbering.nv and not articulated]
     loops: Rows = []
     for c, part, a, b in ends:
         sign = int(numbering.sites[b].link in beyond) - int(numbering.sites[a].link in beyond)
         if sign:
             loops.append((c, sign, part))
-    return momenta, columns, loops
+    return loops

@@ -180,12 +180,6 @@ def _symmetric(J: np.ndarray) -> list[float]:
     return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
 
 
-#: depth of a tree up to which the mass matrix is factored as a matrix; beyond, articulated inertias take less time
-#: (docs/engine.md). Depth: root mean square, over the free coordinates, of the number of coordinates from each to the
-#: ground, itself counted but no other mode of its own body
-DEEP_TREE = 8.0
-
-
 def _topology_tables(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
     """Return the tables that follow from links, joints, frames and flexible bodies; those of closures excluded."""
     return {
@@ -193,7 +187,7 @@ def _topology_tables(numbering: Numbering, parts: Parts, books: Books) -> dict[A
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
         m.SITE_NUMBERS: [np.concatenate([s.placement.p, s.placement.R.ravel()]) for s in numbering.sites],
         **flexible_bodies.fill(numbering, [book.loss for book in books]),
-        **index_tables.mass_entries(numbering, parts.articulated),
+        **index_tables.mass_entries(numbering),
     }
 
 
@@ -206,21 +200,7 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool)
         forms=tuple(sorted({law.form for law in normals})),
         closures=bool(mechanism.closures or mechanism.scene.gear),
         harmonics=harmonics,
-        articulated=is_deep_tree(numbering),
     )
-
-
-def is_deep_tree(numbering: Numbering) -> bool:
-    """Return True when the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP_TREE`)."""
-    if not numbering.nv:
-        return False
-    before, depths = [0] * len(numbering.coordinates), list[int]()
-    for i, link in enumerate(numbering.mechanism.links[1:], start=1):
-        own = sum(c < numbering.nv for c in numbering.coordinates[i])
-        above, modes = before[link.branch.parent], numbering.modal_coordinates.get(i, ())
-        depths += [above + k for k in range(1, own + 1)] + [above + own + 1] * len(modes)
-        before[i] = above + own + (len(numbering.moving(i)) if modes else 0)
-    return bool(np.sqrt(np.mean(np.square(depths))) > DEEP_TREE)
 
 
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:

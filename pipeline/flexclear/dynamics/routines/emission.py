@@ -18,9 +18,9 @@ from flexclear.dynamics.specialise.code import Emitter
 #: name of the function in each text
 NAME = "routine"
 _WORD, _OFFSET, _FLOAT = ir.IntType(64), ir.IntType(32), ir.DoubleType()
-#: of routines: the arrays, and the offsets of the call's runs
+#: of routines, which return how many entries of the list to go on: the arrays, and the offsets of the call's runs
 _ROUTINE = ir.FunctionType(
-    ir.VoidType(), [*((_WORD if array == MODES else _FLOAT).as_pointer() for array in ARRAYS), _OFFSET.as_pointer()]
+    _WORD, [*((_WORD if array == MODES else _FLOAT).as_pointer() for array in ARRAYS), _OFFSET.as_pointer()]
 )
 _EVALUATE = ir.FunctionType(
     _WORD,
@@ -36,8 +36,17 @@ def routine_text(code: Code) -> str:
     for k, array in enumerate(code.runs):
         offset = builder.load(builder.gep(offsets, [_OFFSET(k)]))
         begins[str(k)] = builder.gep(arrays[array], [offset])
-    Emitter(builder, code.program, lambda run, k, lane: builder.gep(begins[run], [_OFFSET(k)])).emit()
-    builder.ret_void()
+
+    def where(run: str, k: Any, lane: int) -> Any:
+        return builder.gep(begins[run], [_OFFSET(k) if isinstance(k, int) else k])
+
+    Emitter(builder, code.program, where).emit()
+    onward: Any = _WORD(1)
+    if not code.program.stores:  # `calls.BACK`
+        again = builder.fcmp_ordered(">", builder.load(begins["0"]), _FLOAT(0.5))
+        entries = builder.sext(builder.load(builder.gep(offsets, [_OFFSET(1)])), _WORD)
+        onward = builder.select(again, builder.neg(entries), onward)
+    builder.ret(onward)
     return str(builder.module)
 
 
@@ -57,8 +66,8 @@ def interpreter_text() -> str:
     builder.position_at_end(loop)
     k = builder.phi(_WORD)
     code, where = (_read(builder, table, k) for table in (codes, offsets))
-    builder.call(builder.inttoptr(code, _ROUTINE.as_pointer()), [*given, builder.inttoptr(where, _OFFSET.as_pointer())])
-    following = builder.add(k, _WORD(1))
+    routine, where = builder.inttoptr(code, _ROUTINE.as_pointer()), builder.inttoptr(where, _OFFSET.as_pointer())
+    following = builder.add(k, builder.call(routine, [*given, where]))
     k.add_incoming(_WORD(0), before)
     k.add_incoming(following, loop)
     builder.cbranch(builder.icmp_signed("<", following, count), loop, after)

@@ -31,12 +31,11 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     address,
     call_list,
     equations,
-    has_routines,
     made,
 )
 from flexclear.scene.loads import SampledPid
 from flexclear.system.errors import InputError, SolverError, refuse
-from flexclear.system.progress import Progress, silent
+from flexclear.system.progress import Progress
 
 #: how engines are made of models, if not with compiled functions (`without_compiler`)
 MAKER: ContextVar[Callable[[Model, Mobility], Engine] | None] = ContextVar("maker", default=None)
@@ -140,15 +139,9 @@ class Engine:
             self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
         self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
         if not self.h[m.RATES]:
-            self.h[m.RATES], self.h[m.CALLS] = self._listed(rows, silent)
+            calls = call_list(self.model, self.h, known, rows)
+            self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
         self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
-
-    def _listed(self, rows: bytes, progress: Progress) -> tuple[int, int]:
-        """Return the address of the interpreter, and of the list of calls for selected rows; of kernels without."""
-        if not has_routines(self.model):
-            return int(self.h[m.EVALUATE]), 0
-        calls = call_list(self.model, self.h, self.specialised, rows, progress)
-        return calls.loaded.interpreter, calls.words.ctypes.data
 
     @property
     def staged(self) -> bool:
@@ -170,7 +163,7 @@ class Engine:
                 specialised.rows.append(rows)
             for met in specialised.rows:
                 if not address(self.model, self.h, specialised, met, progress=progress):
-                    self._listed(met, progress)
+                    call_list(self.model, self.h, specialised, met, progress)
         self.connect()
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:

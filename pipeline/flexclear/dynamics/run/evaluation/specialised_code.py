@@ -1,8 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
 It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
-steps run a list of calls of routines if these know all parts of the mechanism, else kernels; all other evaluations are
-those of kernels then. The topology alone decides, so that equal scenes give equal bytes.
+steps run a list of calls of routines, and all other evaluations are those of kernels. The topology alone decides, so
+that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -31,16 +31,6 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
-#: joints, surfaces, loads and effects that routines know (`mechanics`, which is imported only to compile)
-KNOWN = {
-    *("fixed", "revolute", "prismatic", "cylindrical", "slot", "planar", "universal", "spherical", "rotation-vector"),
-    *("free", "clearance-spherical", "clearance-revolute", "clearance-slot", "ball-on-plane", "joint-force"),
-    *("joint-spring", "joint-friction", "joint-expression", "pid", "sampled-pid", "spring-damper", "line-expression"),
-    *("bushing", "point-force", "point-torque", "point-expression", "stiffening", "stops", "gears", "bushings"),
-    *("controllers", "joint_friction", "wear"),
-}
-#: bearings with friction whose loads one routine finds: its code grows with their number cubed (16: 3 s of LLVM)
-MOST_BEARINGS = 16
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
 
@@ -76,8 +66,7 @@ def equations(model: Model, mobility: Mobility) -> dict[str, str]:
         return sources.kernels(model.parts)
     topology = topology_of(model.arrays, model.arrays.h)
     names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)
-    served = has_routines(model)
-    return {name: sources.specialised(model.parts, topology, name, routines=served) for name in names}
+    return {name: sources.specialised(model.parts, topology, name) for name in names}
 
 
 def address(
@@ -95,19 +84,10 @@ def address(
     return known[rows, name]
 
 
-def has_routines(model: Model) -> bool:
-    """Return True when routines know all parts of a mechanism, few bearings rub, and no load looks up a table."""
-    parts = model.parts
-    loads, effects = (kind.partition(" ")[0] for kind in parts.loads), (one.name for one in parts.present)
-    known = KNOWN.issuperset([*parts.joints, *parts.surfaces, *loads, *effects])
-    known &= not any(" T" in kind for kind in parts.loads)  # tables of `scene.formulas`
-    return known and model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
-
-
 def call_list(
     model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
 ) -> ListInstance:
-    """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows."""
+    """Return the list of calls that evaluates a mechanism with closure rows (`mechanics`)."""
     from flexclear.dynamics.mechanics.of_topology import list_of  # here: they import the compiler
     from flexclear.dynamics.routines.store import stored
 
@@ -139,19 +119,19 @@ def made(
     exact: bool = False,
 ) -> int:
     """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
-    parts, of_steps, served = model.parts, name == SPECIALISED, has_routines(model)
+    parts, of_steps = model.parts, name == SPECIALISED
     changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
     with _making:  # engines may run concurrently
         topology = topology_of(model.arrays, selected(model, h, rows))
         key = (parts, topology, name, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
-                source = sources.batched(parts, topology, lanes, routines=served)
+                source = sources.batched(parts, topology, lanes)
             else:
                 source = (
-                    sources.tangent(parts, topology, routines=served)
+                    sources.tangent(parts, topology)
                     if changes
-                    else sources.specialised(parts, topology, name, exact=exact, routines=served)
+                    else sources.specialised(parts, topology, name, exact=exact)
                 )
             try:
                 _known[key] = functions.specialised(name, source, partial(progress, None))

@@ -12,12 +12,11 @@ from flexclear.dynamics.run.evaluation.engine import Engine
 
 def mass_factor(engine: Engine) -> np.ndarray:
     """Return L of the mass matrix M = L L^T of the last evaluation, shape (nv, nv)."""
-    L = _from_envelope(engine)
-    return L + _from_gains(engine) if engine.model.parts.articulated else L
+    return _from_envelope(engine) + _from_gains(engine)
 
 
 def _from_envelope(engine: Engine) -> np.ndarray:
-    """Return the factor in the envelope; with articulated inertias only the blocks of modes and coordinates."""
+    """Return the blocks of modes and coordinates of the factor."""
     L, entries = np.zeros((engine.model.nv,) * 2), engine.view(m.MASS)
     for i, (first, origin) in enumerate(engine.model.arrays.table(m.ENVELOPE)):
         L[i, first : i + 1] = entries[origin + first : origin + i + 1]
@@ -47,8 +46,6 @@ def carried_wrenches(engine: Engine, w: np.ndarray | None = None) -> tuple[np.nd
     """
     w = engine.w if w is None else w
     moments, pushes = (_vectors(engine, w, m.WRENCH, field) for field in (m.WRENCH.moment, m.WRENCH.force))
-    if not engine.model.parts.articulated:  # passed to the ground by the kernels
-        return moments, pushes
     own, origins = (
         _vectors(engine, w, m.ARTICULATED, m.ARTICULATED.own_force),
         _vectors(engine, w, m.LINK_FRAMES, m.LINK_FRAMES.origin),
@@ -68,8 +65,6 @@ def bias(engine: Engine, w: np.ndarray | None = None) -> np.ndarray:
     w: the work space; that of the last evaluation, or one of numbers with changes (`specialise.dual`).
     """
     model, w = engine.model, engine.w if w is None else w
-    if not model.parts.articulated:
-        return _stretch(engine, w, m.BIAS)[: model.nv].copy()
     moments, pushes = carried_wrenches(engine, w)
     turns, shifts = (_vectors(engine, w, m.COLUMNS, field) for field in (m.COLUMNS.angular, m.COLUMNS.linear))
     numbering, forces = model.numbering, _stretch(engine, w, m.MODAL_BIAS)[: model.nv].copy()
