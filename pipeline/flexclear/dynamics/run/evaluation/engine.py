@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -38,6 +39,8 @@ from flexclear.scene.loads import SampledPid
 from flexclear.system.errors import InputError, SolverError, refuse
 from flexclear.system.progress import Progress, silent
 
+#: how engines are made of models, if not with compiled functions (`without_compiler`)
+MAKER: ContextVar[Callable[[Model, Mobility], Engine] | None] = ContextVar("maker", default=None)
 #: of effects: why a run stopped, in words
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: selections of closure rows with specialised steps, per integration
@@ -277,11 +280,16 @@ def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[
 
 
 def prepare(model: Model, progress: Progress) -> Engine:
-    """Return the engine of a model, its kernels compiled or loaded. Raise SolverError for an impossible start."""
+    """Return the engine of a model, its kernels compiled or loaded unless `MAKER` makes another.
+
+    Raises SolverError for an impossible start.
+    """
     refuse(start_errors(model.mechanism, final=False))
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
     refuse_singular(model, mobility)
+    if make := MAKER.get():
+        return make(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
     engine = assemble(model, entry, METHODS[solver.integrator], mobility)

@@ -5,6 +5,8 @@ An evaluation takes milliseconds, a thousand times as long as compiled code: eno
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +18,7 @@ from flexclear.dynamics.compile import functions, sources
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.run.evaluation.engine import Engine, assemble
+from flexclear.dynamics.run.evaluation.engine import MAKER, Engine, assemble
 from flexclear.dynamics.run.evaluation.specialised_code import described_in_python
 
 
@@ -56,6 +58,16 @@ def uncompiled(model: Model, mobility: Mobility) -> Engine:
     """Return an engine for the start of a model's run, without compilation."""
     method = METHODS[model.scene.solver.integrator]
     return assemble(model, Uncompiled({}, _kernels(model)), method, mobility, PythonEngine)
+
+
+@contextmanager
+def without_compiler() -> Iterator[None]:
+    """Let all engines that are prepared during the context be evaluated in Python."""
+    token = MAKER.set(uncompiled)
+    try:
+        yield
+    finally:
+        MAKER.reset(token)
 
 
 def _kernels(model: Model) -> SimpleNamespace:
