@@ -92,7 +92,6 @@ def make_inertia(tree: Any) -> Callable:
 
 
 @kernel
-@kernel
 def apply_wrench(d, s, moment, force):
     """Apply a wrench (moment about the kernels' origin, force; world) to the link of site s, and to its modes."""
     site = d.sites[s]
