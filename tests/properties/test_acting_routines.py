@@ -1,23 +1,24 @@
 """Routines of contacts, stops and loads compute what kernels do: of random mechanisms, in contact and out of it."""
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
 
+from flexclear.dynamics import joints as kinds_of_joints
 from flexclear.dynamics import loads as kinds_of_loads
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact import surfaces as kinds_of_surfaces
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.normal import NORMAL_LAWS
-from flexclear.dynamics.effects import EFFECTS
 from flexclear.dynamics.mechanics.joints import JOINTS
 from flexclear.dynamics.mechanics.loads import LOADS
+from flexclear.dynamics.mechanics.of_topology import list_of
 from flexclear.dynamics.mechanics.surfaces import SURFACES as SURFACES_OF_ROUTINES
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
-from flexclear.dynamics.run.evaluation import specialised_code
-from flexclear.dynamics.run.evaluation.specialised_code import KNOWN, has_routines
+from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE
@@ -179,12 +180,41 @@ def test_every_surface_law_and_load_is_tried() -> None:
     assert kinds == set(kinds_of_loads.LOADS)
 
 
-def test_kernels_serve_parts_that_routines_lack(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert set().union(JOINTS, SURFACES_OF_ROUTINES, LOADS, (effect.name for effect in EFFECTS)) == KNOWN
-    model = pressed(1).model
-    assert has_routines(model)
-    monkeypatch.setattr(specialised_code, "KNOWN", KNOWN - {model.parts.surfaces[0]})
-    assert not has_routines(model)
+def test_routines_know_all_parts() -> None:
+    """Nothing else makes steps."""
+    assert set(JOINTS) == set(kinds_of_joints.JOINTS)
+    assert set(SURFACES_OF_ROUTINES) == set(kinds_of_surfaces.SURFACES)
+    assert set(LOADS) == set(kinds_of_loads.LOADS)
+
+
+def sampled(*of: list[float], between: str) -> Table:
+    """A table over one or two angles."""
+    columns = [{"column": f"q{k}", "unit": "rad"} for k in range(len(of))]
+    points = [[*place, float(np.sin(3.0 * sum(place)))] for place in product(*of)]
+    value = {"column": "m", "unit": "N m"}
+    return {"file": "given.csv", "of": columns, "value": value, "between": between, "points": points}
+
+
+@pytest.mark.parametrize("between", ["cubic", "linear"])
+@pytest.mark.parametrize("angles", [0.0, 0.4, 3.0])
+def test_tables_are_looked_up_as_by_kernels(between: str, angles: float) -> None:
+    """Over one and two quantities, with one interval and many; outside of them nothing is a number."""
+    random = np.random.default_rng(3)
+    near, far = ([-1.0, *np.sort(random.uniform(-1.0, 1.0, size=count)).tolist(), 1.0] for count in (3, 9))
+    of = {"a": ([-1.0, 1.0],), "b": (far,), "c": (near, far)}
+    tables = {name: sampled(*axes, between=between) for name, axes in of.items()}
+    force = "table(c, joint0.position, joint1.position) + table(b, joint2.position) * 2 - table(a, joint1.position)"
+    load = {"type": "joint-expression", "joint": "joint0", "force": force, "tables": tables}
+    model = tabulate(build(Scene.model_validate(rods(3, load={"measured": load})), {}))
+    with np.errstate(invalid="ignore"):
+        found = evaluated(model, turns=angles)
+    if angles < 1.0:
+        assert_alike(found)
+        return
+    w, n = by_routines(found)
+    assert np.isnan(found.rates[model.speeds]).all()
+    assert np.isnan(w[found.h[m.SLOPES] :][model.speeds]).all()
+    assert n[m.EVALUATION] == found.report
 
 
 # Friction of ideal joints, gears --------------------------------------------------------------------------------------
@@ -231,6 +261,19 @@ def assert_rubs_alike(found: Evaluated) -> None:
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_joints_rub_as_by_kernels(number: int) -> None:
     assert_rubs_alike(evaluated(tabulate(build(Scene.model_validate(rubbing_tree(number)), {})), turns=0.1))
+
+
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_many_joints_rub_as_by_kernels_and_code_grows_little() -> None:
+    """Bearings of another number are other rows of the same routines, which a loop of calls runs."""
+    sizes = []
+    for count in (9, 18):
+        scene = Scene.model_validate(with_friction(rods(count, ("revolute", "spherical"), children=2), 0))
+        model = tabulate(build(scene, {}))
+        assert_rubs_alike(evaluated(model, turns=0.1))
+        codes = list_of(model.parts, topology_of(model.arrays, model.arrays.h)).codes
+        sizes.append(sum(len(code.program.block) for code in codes))
+    assert sizes[1] < 5 * sizes[0]
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")

@@ -9,9 +9,10 @@ import pytest
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics.of_topology import program_of
+from flexclear.dynamics.mechanics.of_topology import list_of, program_of
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
+from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
@@ -21,9 +22,8 @@ from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.properties import tapes
-from tests.properties.articulated_chains import Evaluated, Long, bending, evaluated, reduced, rods, tabulated
+from tests.properties.articulated_chains import Evaluated, bending, evaluated, reduced, rods, tabulated
 from tests.properties.mechanisms import Table
-from tests.properties.test_specialised import description_kernel
 
 #: of the largest; the mass matrix of the chains here has a condition of 1e5 at most, of which 2e-12 was left
 ROUNDING = 1e-9
@@ -94,12 +94,13 @@ def bent(name: str) -> Evaluated:
 
 def kinetic_energy(found: Evaluated) -> Callable[[np.ndarray], Any]:
     """Kinetic energy of the speeds of all coordinates in the evaluated pose, in extended precision."""
-    model, h, w = found.model, found.h, found.w.astype(np.longdouble)
-    plain, u = Long(0).plain(description_kernel(model)), slice(int(h[m.U]), int(h[m.U]) + len(found.stretch(m.U)))
+    model, h, w, f = found.model, found.h, found.w.astype(np.longdouble), found.model.arrays.f.astype(np.longdouble)
+    topology, y, drives = topology_of(model.arrays, h), int(h[m.Y]), model.arrays.size(m.N_DRIVES)
+    rates = int(h[m.LAW.at]) + m.LAW.rate + m.LAW.size * np.arange(drives)
 
     def energy(speeds: np.ndarray) -> Any:
-        w[u] = speeds
-        plain(h.tolist(), model.arrays.f.astype(np.longdouble), w, found.space.n)
+        w[y : y + model.ny][model.speeds], w[rates] = speeds[: model.nv], speeds[model.nv :]
+        list_of(model.parts, topology, m.RECORD_CALLS, Numbers(h, f, w, found.space.n, y, int(h[m.SLOPES])))
         return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 
     return energy

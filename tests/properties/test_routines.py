@@ -12,17 +12,19 @@ from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures, flexible, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
+from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
 from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
-from flexclear.dynamics.mechanics.of_topology import list_of
+from flexclear.dynamics.mechanics.of_topology import list_of, mechanism_of
+from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.routines.store import load
 from flexclear.dynamics.run.evaluation import engine, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.specialised_code import has_routines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
@@ -63,13 +65,28 @@ _EVALUATE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 4, ctypes.c_do
 NO_LAWS = ctypes.CFUNCTYPE(ctypes.c_int64)(lambda: 0)
 
 
-def by_routines(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
-    """The work space w, and n, after an evaluation by routines of what kernels have evaluated; results are new."""
+def without_results(found: Evaluated) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, int]:
+    """h, w and n of what kernels have evaluated, without what routines store; places of the state and its rates."""
     model, space = found.model, found.space
-    h, f, w, n = space.h.copy(), model.arrays.f, space.w.astype(float), space.n.copy()
+    h, w, n = space.h.copy(), space.w.astype(float), space.n.copy()
     y, dy, rows = int(h[m.Y]), int(h[m.SLOPES]), model.arrays.size(m.N_CLOSURE_ROWS)
     for begin, count in ((dy, model.ny), (h[m.RESIDUAL], rows), (h[m.RESIDUAL_RATE], rows), (h[m.PIVOT], min(rows, 1))):
         w[begin : begin + count] = np.nan
+    return h, w, n, y, dy
+
+
+def by_numbers(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
+    """As `by_routines`, on numbers in Python."""
+    model, (h, w, n, y, dy) = found.model, without_results(found)
+    calls = Numbers(h, model.arrays.f, w, n, y, dy)
+    evaluated_by(mechanism_of(Tables(model.parts, topology_of(model.arrays, h))), calls)
+    n[[m.EVALUATION, m.ABRIDGED, m.STATE]] = calls.report, 1, y
+    return w, n
+
+
+def by_routines(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
+    """The work space w, and n, after an evaluation by routines of what kernels have evaluated; results are new."""
+    model, f, (h, w, n, y, dy) = found.model, found.model.arrays.f, without_results(found)
     calls = load(list_of(model.parts, topology_of(model.arrays, h)), silent_text).instance(h)
     h[m.PRESCRIBE], h[m.CALLS] = ctypes.cast(NO_LAWS, ctypes.c_void_p).value, calls.words.ctypes.data
     _EVALUATE(calls.loaded.interpreter)(*(array.ctypes.data for array in (h, f, w, n)), 0.1, y, dy)
@@ -82,8 +99,12 @@ def silent_text(text: str) -> None:
 
 def assert_alike(found: Evaluated) -> None:
     """Rates of positions, speeds and ledger; residuals, rates and pivots of the loops; the report."""
-    model, h, (w, n) = found.model, found.h, by_routines(found)
-    assert has_routines(model)
+    for w, n in (by_routines(found), by_numbers(found)):
+        assert_same(found, w, n)
+
+
+def assert_same(found: Evaluated, w: np.ndarray, n: np.ndarray) -> None:
+    model, h = found.model, found.h
     rates, speeds = w[h[m.SLOPES] :][: model.ny], model.speeds
     for part in (slice(speeds.start), speeds, slice(speeds.stop, None)):
         assert apart(rates[part], found.rates[part].astype(float)) < ROUNDING
@@ -193,7 +214,8 @@ def test_rounding_does_not_grow_with_the_distance_from_the_origin() -> None:
 def test_coordinates_that_move_no_mass_are_noticed(coaxial: bool) -> None:
     with np.errstate(invalid="ignore"):
         found = evaluated(tabulated(Scene.model_validate(massless(coaxial))))
-    assert by_routines(found)[1][m.EVALUATION] == found.report == (m.NOT_POSITIVE if coaxial else m.OK)
+    for evaluate in (by_routines, by_numbers):
+        assert evaluate(found)[1][m.EVALUATION] == found.report == (m.NOT_POSITIVE if coaxial else m.OK)
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
@@ -203,7 +225,8 @@ def test_dependent_rows_are_a_singular_pose() -> None:
     everything = np.ones(found.model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
     assert by_routines(found)[1][m.EVALUATION] == m.OK
     selection.write(found.model, found.h, everything)
-    assert by_routines(found)[1][m.EVALUATION] == m.SINGULAR
+    for evaluate in (by_routines, by_numbers):
+        assert evaluate(found)[1][m.EVALUATION] == m.SINGULAR
 
 
 # Joints ---------------------------------------------------------------------------------------------------------------

@@ -80,13 +80,6 @@ def test_what_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
         program(rates_kernel(model), topology_of(model.arrays, model.arrays.work_space(m.Room(2, 0)).h))
 
 
-def description_kernel(model: Model) -> Any:
-    """The kernel of what is recorded of an evaluation."""
-    scope: dict[str, Any] = {}
-    exec(sources.specialised(model.parts, (), sources.DESCRIBED).partition("TOPOLOGY")[0], scope)
-    return scope["description"]
-
-
 def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> float:
     """Of two work spaces, as share of the largest number of a stretch."""
     stretches, worst = [*m.STRETCHES.values(), *(table.at for table in m.TABLES["w"])], 0.0
@@ -117,18 +110,17 @@ def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPa
     """All without a compiler: kernels on numbers, what they wrote on the tape, and what routines did; contacts open
     and closed.
 
-    What steps read, all of the work space, and with what is recorded; also of what would be too long.
+    What steps read, and all of the work space; also of what would be too long.
     """
     monkeypatch.setattr(tracing, "LONGEST", 200_000)
     model = tabulate(build(load_scene(path), {}))
     space, f = model.arrays.work_space(m.Room(2, 0)), model.arrays.f
     h, y, dy = space.h, int(space.h[m.Y]), int(space.h[m.SLOPES])
-    kernel, described, start = rates_kernel(model), description_kernel(model), initial.start_state(model)
+    kernel, start = rates_kernel(model), initial.start_state(model)
     space.w[y : y + model.ny] = start
     keep_independent(model, h, y, dy, space.w.copy(), space.n.copy(), kernel)
     topology = topology_of(model.arrays, h)
     tape, whole = program_of(model.parts, topology, 200_000), program(kernel, topology, 200_000)
-    record = program(described, topology, 200_000, describes=True)
     start[model.speeds] += np.random.default_rng(1).normal(size=model.nv)
     for closed in (0, 1):
 
@@ -149,9 +141,6 @@ def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPa
         for read in read_by_steps(model, h):
             room = ROUNDING * np.abs(one[read]).max(initial=1.0)
             assert other[read] == pytest.approx(one[read], rel=ROUNDING, abs=room)
-        assert largest_difference(h, one, by_whole["w"]) < ROUNDING
-        Trace(0).plain(described)(h.tolist(), f, by_kernels["w"], by_kernels["n"])
-        tapes.run(record, h, by_whole, y, dy)
         assert largest_difference(h, one, by_whole["w"]) < ROUNDING
 
 

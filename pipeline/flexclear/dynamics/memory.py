@@ -166,8 +166,10 @@ class Room:
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`). RATES: the function that steps
 #: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`);
-#: RUN: the function that runs other lists: CORRECT, DISPLACE, and SPRINGS in two parts (`mechanics.responses`)
-EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RUN, CORRECT, DISPLACE, SPRINGS = _indices(11)
+#: DESCRIBE, RECORD_CALLS: the function that stores what the record has as well, and its list; RUN: the function that
+#: runs other lists: CORRECT, DISPLACE, and SPRINGS in two parts (`mechanics.responses`)
+EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RECORD_CALLS = _indices(8)
+RUN, CORRECT, DISPLACE, SPRINGS = _indices(4)
 ADDRESSES = range(EVALUATE, SPRINGS + 1)
 PART = 32  #: bytes from a part of a list to the next
 

@@ -37,7 +37,6 @@ from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import (
     ZERO,
     add,
-    add_wrench,
     at6,
     at9,
     congruence,
@@ -68,13 +67,7 @@ def _uncoupled(d):
     """Leave the forces on the modes."""
 
 
-@kernel
-def _no_energy(d, component):
-    """Return zero: the elastic energy is of second order."""
-    return 0.0
-
-
-LINEAR = SimpleNamespace(first_moment=_still, at_port=_still_frame, couple=_uncoupled, coupling_energy=_no_energy)
+LINEAR = SimpleNamespace(first_moment=_still, at_port=_still_frame, couple=_uncoupled)
 
 
 def of_each(body: Callable) -> Callable:
@@ -98,7 +91,7 @@ def flexible_bodies(stiffening: Any = LINEAR) -> Callable[[Any], FlexibleBodies]
 
 
 def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
-    first_moment, couple, coupling_energy = stiffening.first_moment, stiffening.couple, stiffening.coupling_energy
+    first_moment, couple = stiffening.first_moment, stiffening.couple
     site, inboard = make_ports(stiffening.at_port, tree)
     carried, body_mass_matrix = make_carrying(tree)
     reference, demand_of = tree.origin, tree.demand_of
@@ -200,7 +193,7 @@ def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
     def body_inertia(d, k):
         """Store spatial inertia, wrench, modal forces and modal momenta of flexible body k.
 
-        Like `rigid.inertia`, with zero modal accelerations; `modal_inertia` adds their part.
+        Like `rigid.inertia`, with zero modal accelerations.
         Source: Wang & Wang (2019), eqs. (9), (14), (15).
         """
         body, mass = d.flexes[k], d.flex_numbers[k].mass
@@ -229,52 +222,10 @@ def _flexible_bodies(stiffening: Any, tree: Any) -> FlexibleBodies:
         shapes(d, k, R, p, moment, force)
 
     @kernel
-    def body_modal_inertia(d, k):
-        """Add the effect of the modal accelerations in DU to the wrench on the body's link (right after `inertia`)."""
-        body = d.flexes[k]
-        for j in range(body.c0, body.c0 + body.n_modes):
-            # the part of the body frame, which such shapes move, is in the frame's own acceleration
-            angular = d.deformation[j].angular if body.inboard else d.momenta[j].angular
-            linear = d.deformation[j].linear if body.inboard else d.momenta[j].linear
-            add_wrench(d.wrench[body.link], scale(d.du[j], angular), scale(d.du[j], linear))
-
-    @kernel
-    def body_energies(d, k):
-        """Return kinetic and elastic energy [J] of flexible body k."""
-        body = d.flexes[k]
-        n, frame = body.n_modes, d.link_frames[body.link]
-        invariants(d, k)
-        first, first_rate = sums(d, k)
-        R = frame.axes
-        omega, v = turn_back(R, frame.omega), turn_back(R, frame.velocity)
-        kinetic = 0.5 * d.flex_numbers[k].mass * dot(v, v) + dot(v, add(cross(omega, first), first_rate))
-        kinetic += 0.5 * dot(omega, turn_symmetric(tensor(d.scratch), omega))
-        elastic, M = 0.0, body.data0 + 12 * n
-        K = M + n * n
-        for i in range(n):
-            rate = d.u[body.c0 + i]
-            kinetic += dot(omega, spin(d.modal, 0, n, i)) * rate
-            elastic += 0.5 * d.flex_data[K + i].value * d.x[body.q0 + i] ** 2
-            for j in range(n):
-                kinetic += 0.5 * d.flex_data[M + i * n + j].value * rate * d.u[body.c0 + j]
-        return kinetic, elastic
-
-    @kernel
-    def energies(d, component):
-        kinetic, elastic = 0.0, coupling_energy(d, component)
-        for k in range(d.n_flex):
-            if d.links[d.flexes[k].link].component == component:
-                moving, bent = body_energies(d, k)
-                kinetic += moving
-                elastic += bent
-        return kinetic, elastic
-
-    @kernel
     def inertia(d):
         for k in range(d.n_flex):
             body_inertia(d, k)
         couple(d)
 
-    mass_matrix, modal_inertia = map(of_each, (body_mass_matrix, body_modal_inertia))
-    before = (deform, site, inboard, inertia, mass_matrix, modal_inertia)
-    return FlexibleBodies(*before, modal_rates, energies)
+    before = (deform, site, inboard, inertia, of_each(body_mass_matrix))
+    return FlexibleBodies(*before, modal_rates)

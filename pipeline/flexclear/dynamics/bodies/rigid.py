@@ -32,11 +32,6 @@ def _same_frame(d, i, p, R, omega, v, alpha, a):
     return p, R, omega, v, alpha, a
 
 
-@kernel
-def _no_energy(d, component):
-    return 0.0, 0.0
-
-
 @dataclass(frozen=True)
 class FlexibleBodies:
     """Kernels of all flexible bodies; the defaults are for scenes without any.
@@ -44,8 +39,7 @@ class FlexibleBodies:
     deform(d): X and U to the interface basis, before all else.  site(d, s): motion of a frame, returns its arm from the
     link's origin.  inboard(d, i, ...): from the frame of a link's inboard joint to the link's own (see `ports`).
     inertia(d): spatial inertias, wrenches and modal forces, for zero modal accelerations. mass_matrix(d): modal blocks,
-    right after `inertia`.  modal_inertia(d): part of the modal accelerations in the wrenches. modal_rates(d, dy):
-    modal accelerations into the state's rates.  energies(d, component): kinetic and elastic [J].
+    right after `inertia`.  modal_rates(d, dy): modal accelerations into the state's rates.
     """
 
     deform: Callable = nothing
@@ -53,9 +47,7 @@ class FlexibleBodies:
     inboard: Callable = _same_frame
     inertia: Callable = nothing
     mass_matrix: Callable = nothing
-    modal_inertia: Callable = nothing
     modal_rates: Callable = nothing
-    energies: Callable = _no_energy
 
 
 def all_rigid(tree: Any) -> FlexibleBodies:
@@ -97,16 +89,6 @@ def make_inertia(tree: Any) -> Callable:
         demand_of(d, i, add(moment, cross(c, force)), force)
 
     return inertia
-
-
-@kernel
-def kinetic_energy(d, i):
-    """Return the kinetic energy [J] of a rigid link."""
-    frame, link = d.link_frames[i], d.link_numbers[i]
-    R, omega = frame.axes, frame.omega
-    v = add(frame.velocity, cross(omega, turn(R, link.com)))
-    J = congruence(R, at6(link.inertia, 0))
-    return 0.5 * (link.mass * dot(v, v) + dot(omega, turn_symmetric(J, omega)))
 
 
 @kernel

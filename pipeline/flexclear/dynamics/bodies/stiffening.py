@@ -88,16 +88,3 @@ def couple(d):
             force += dot(on_curvature, of_mode(d.station_data, b + 3 * n, n, j))
             # shapes are eigenmodes where loads stiffen a body
             d.modal_bias[body.c0 + j] += force
-
-
-@kernel
-def coupling_energy(d, component):
-    """Return this part of the elastic energy [J] of the rods of an independent mechanism."""
-    energy = 0.0
-    for s in range(d.n_stations):
-        if d.links[d.flexes[d.stations[s].flex].link].component == component:
-            stiffness = at6(d.station_stiffness[s].matrix, 0)
-            _, curved, strain, _, _ = _station(d, s)
-            energy += 0.5 * dot(strain, turn_symmetric(stiffness, strain))
-            energy -= 0.5 * dot(curved, turn_symmetric(stiffness, curved))
-    return energy

@@ -77,9 +77,9 @@ def laws(h, f, w, n, t):
 
 
 @kernel
-def describe(h, f, w, n):
-    """Evaluate the recorded quantities: `equations.observation`."""
-    call(h[m.DESCRIBE], (h, f, w, n))
+def describe(h, f, w, n, t, y, dy):
+    """Evaluate the right-hand side, and store what the record has of it: `mechanics.record`."""
+    call(h[m.DESCRIBE], (h, f, w, n, float(t), y, dy))
 
 
 @kernel

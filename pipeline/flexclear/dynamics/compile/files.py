@@ -30,14 +30,13 @@ loaded: dict[str, machine_code.Code] = {}
 interpreted: dict[int, Callable] = {}
 CODE = ".code"  #: suffix of the compiled code of a file
 #: arguments of compiled functions, which return an integer: pointers to integers (I) and floats (F), an integer (i), a
-#: float (f).  After h, f, w, n: t, y, dy, and a tolerance; t; nothing; rows and pieces with
-#: their shapes, tolerance, out with its length; t, repeat, outputs with their number, rows, events; step, t_new, rows,
-#: events.  Of several lanes: table, places, numbers
+#: float (f).  After h, f, w, n: t, y, dy, and a tolerance; t; rows and pieces with their shapes, tolerance, out with
+#: its length; t, repeat, outputs with their number, rows, events; step, t_new, rows, events.  Of several lanes: table,
+#: places, numbers
 SIGNATURES = {
     "evaluate": "IFFI fii",
     "project": "IFFI fiif",
     "prescribe": "IFFI f",
-    "describe": "IFFI",
     "observe": "IFFI Fii Iii fFi",
     "advance": "IFFI fi Fi Fii Fii",
     "resolve": "IFFI ff Fii Fii",

@@ -27,7 +27,7 @@ from flexclear.dynamics.compile import machine_code, sources
 from flexclear.dynamics.compile.compiler_process import second_process
 from flexclear.dynamics.compile.files import CODE, SIGNATURES, compiled, interpreted, load_files, loaded
 from flexclear.dynamics.compile.folder import prune, writable
-from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.compile.sources import SPECIALISED, WHOLE
 from flexclear.dynamics.effects import Parts, Scheme
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.workflow.fingerprint import TREE, library_version, sources_of
@@ -41,8 +41,6 @@ FUNCTIONS: dict[str, tuple[str, int | None]] = {
     "project": ("projection onto loop closures", m.PROJECT),
     "observe": ("outputs", None),
     "evaluate": ("equations of motion", m.EVALUATE),
-    "describe": ("outputs", m.DESCRIBE),
-    DESCRIBED: ("specialised outputs", None),
     WHOLE: ("specialised equations of motion", None),
     SPECIALISED: ("specialised equations of motion", None),
     "resolve": ("location of events", m.RESOLVE),
@@ -94,7 +92,7 @@ def entry(
     texts = {**sources.sources(parts, scheme), **equations}
     files = {name: _file(folder, name, source) for name, source in texts.items()}
     _load(folder, files, report, began)
-    if not all(loaded[files[name].stem].address for name in (WHOLE, DESCRIBED) if name in files):
+    if WHOLE in files and not loaded[files[WHOLE].stem].address:
         kernels = {name: _file(folder, name, source) for name, source in sources.kernels(parts).items()}
         _load(folder, kernels, report, began)
         files |= kernels

@@ -4,8 +4,8 @@ A file composes exactly the kernels of the kinds present: kernels that a scene d
 compiled. A file depends on no more than it needs, so that mechanisms share files: steps depend on the integrator and on
 the presence of closures and contacts, not on joints or bodies.
 
-Effects declare what they add to a file (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
-right-hand side) and "observe" (recorded quantities).
+Effects declare what they add to a file (`effects.effect`), at three points: "forces", "closures" and "evaluate" (the
+right-hand side).
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ FAMILIES = {
 }
 #: modules of calls by address, and of functions assembled from LLVM code
 CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
-#: specialised code: right-hand side as steps call it, right-hand side with all its side results, recorded quantities
-SPECIALISED, WHOLE, DESCRIBED = "specialised", "whole", "described"
+#: specialised code: right-hand side as steps call it, right-hand side with all its side results
+SPECIALISED, WHOLE = "specialised", "whole"
 PROGRAM, BATCHED = f"{DYNAMICS}.specialise.program", (f"{DYNAMICS}.specialise", "batched")
 PRESCRIBED, RIGHT_HAND_SIDE = f"{DYNAMICS}.equations.prescribed_motion", f"{DYNAMICS}.equations.right_hand_side"
 
@@ -146,10 +146,8 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
 
 
 def kernels(parts: Parts) -> dict[str, str]:
-    """Return the sources of generic right-hand side and recorded quantities, for a topology without own code."""
-    formulas = _formulas(parts)
-    described = _description(parts).calling("describe", formulas=formulas)
-    return {"evaluate": _right_hand_side(parts).calling("evaluate", "t, y, dy", formulas), "describe": described}
+    """Return the source of the generic right-hand side, for a topology without own code."""
+    return {"evaluate": _right_hand_side(parts).calling("evaluate", "t, y, dy", _formulas(parts))}
 
 
 def _laws(parts: Parts) -> Composition:
@@ -168,40 +166,36 @@ def _right_hand_side(parts: Parts) -> Composition:
     return file
 
 
-def specialised(
-    parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False, routines: bool = True
-) -> str:
+def specialised(parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False) -> str:
     """Return the source of specialised code for one topology.
 
-    name: of the right-hand side as steps call it, of that with all its side results, or of the recorded quantities.
-    exact: True for the same bits as in each of several lanes.  routines: True where these serve the mechanism, for
-    steps; else its kernels do.
+    name: of the right-hand side as steps call it, or of that with all its side results.
+    exact: True for the same bits as in each of several lanes.
     """
     if name == SPECIALISED:
         longest = "LONGEST" if exact else "LONGEST_STRAIGHT"
         used = [FILES, (PROGRAM, "llvm_text"), (PROGRAM, "NAME")]
-        return _of_topology(parts, topology, STRAIGHT, used, longest, routines, exact=exact)
-    file = _description(parts) if name == DESCRIBED else _equations(parts)
+        return _of_topology(parts, topology, STRAIGHT, used, longest, exact=exact)
+    file = _equations(parts)
     for taken in ("llvm_text", "program", "NAME"):
         file.take(PROGRAM, taken)
     file.what += ", for one topology"
-    options = ", describes=True" if name == DESCRIBED else ""
-    function = ONE_TOPOLOGY.format(topology=_rows(topology), kernel=file.kernel, options=options)
+    function = ONE_TOPOLOGY.format(topology=_rows(topology), kernel=file.kernel)
     return file.text(function, _formulas(parts), FILES)
 
 
-def batched(parts: Parts, topology: Topology, lanes: int, *, routines: bool = True) -> str:
+def batched(parts: Parts, topology: Topology, lanes: int) -> str:
     """Return the source of the function that advances several steppers of one topology (`compile.lanes`)."""
     taken = [CALLS, (f"{DYNAMICS}.compile.lanes", "make_lanes"), BATCHED]
-    return _of_topology(parts, topology, LANES, taken, "LONGEST", routines, lanes=lanes)
+    return _of_topology(parts, topology, LANES, taken, "LONGEST", lanes=lanes)
 
 
-def tangent(parts: Parts, topology: Topology, *, routines: bool = True) -> str:
+def tangent(parts: Parts, topology: Topology) -> str:
     """Return the source of the right-hand side for one topology with its tangents."""
     taken, change = [CALLS, (f"{DYNAMICS}.fields", "data"), BATCHED, (PRESCRIBED, "make_law_changes")], ""
     if parts.harmonics:
         taken.append((f"{DYNAMICS}.drives.oscillation", change := "change_oscillation"))
-    return _of_topology(parts, topology, CHANGES, taken, "LONGEST_DIFFERENTIATED", routines, harmonics=change)
+    return _of_topology(parts, topology, CHANGES, taken, "LONGEST_DIFFERENTIATED", harmonics=change)
 
 
 def _of_topology(
@@ -210,16 +204,10 @@ def _of_topology(
     template: str,
     taken: list[tuple[str, str]],
     longest: str,
-    routines: bool,
     **values: object,
 ) -> str:
     """Return the source of code for steps; taken: modules and names that it imports; longest: name of its limit."""
     values["topology"], taken = _rows(topology), [*taken, (PROGRAM, longest)]
-    if not routines:
-        file = _equations(parts)
-        file.imports += [*taken[1:], (PROGRAM, "program")]
-        made = f"program({file.kernel}, TOPOLOGY, {longest})"
-        return file.text(template.format(made=made, **values), _formulas(parts), taken[0])
     taken += [("flexclear.dynamics.effects", "Parts"), (f"{DYNAMICS}.mechanics.of_topology", "program_of")]
     imports = "".join(f"from {module} import {name}\n" for module, name in sorted(taken))
     made = template.format(made=f"program_of(PARTS, TOPOLOGY, {longest})", **values)
@@ -241,10 +229,10 @@ def for_python(parts: Parts) -> Iterator[tuple[str, str, str]]:
     They call those before them as the names of `calls`.
     """
     formulas = _formulas(parts)
-    files = {"laws": _laws(parts), "evaluate": _right_hand_side(parts), "describe": _description(parts)}
+    files = {"laws": _laws(parts), "evaluate": _right_hand_side(parts)}
     files |= {"project": _projection(parts)} if parts.closures else {}
     for name, file in (files | {"observe": _observation(parts)}).items():
-        yield name, file.kernel, file.text("", formulas if name in ("evaluate", "describe") else "")
+        yield name, file.kernel, file.text("", formulas if name == "evaluate" else "")
 
 
 def _equations(parts: Parts, *, whole: bool = True) -> Composition:
@@ -265,21 +253,10 @@ def _projection(parts: Parts) -> Composition:
     return file
 
 
-def _description(parts: Parts) -> Composition:
-    """Return a file for the recorded quantities of an evaluation."""
-    maker = (f"{DYNAMICS}.equations.observation", "make_description")
-    file = _forces(parts, "what is recorded of", "description", maker)
-    file.add_effects("observe")
-    if parts.closures:
-        file.add_effects("observe closures")
-    return file
-
-
 def _observation(parts: Parts) -> Composition:
     """Return a file for the record of states."""
     file = Composition(parts, "record", "observation", (f"{DYNAMICS}.equations.observation", "make_observation"))
-    file.given = {"evaluate": "calls.evaluate", "laws": "calls.laws", "describe": "calls.describe"}
-    file.given["project"] = file.projection
+    file.given = {"describe": "calls.describe", "project": file.projection}
     return file
 
 
@@ -370,7 +347,7 @@ def _formulas(parts: Parts) -> str:
 # laws of time are not specialised: their pieces change with time, and their number with the scene's numbers
 ONE_TOPOLOGY = """TOPOLOGY = (
 {topology})
-files.assembles(__name__, NAME, lambda: llvm_text(program({kernel}, TOPOLOGY{options}){options}), 0)
+files.assembles(__name__, NAME, lambda: llvm_text(program({kernel}, TOPOLOGY)), 0)
 """
 STRAIGHT = """TOPOLOGY = (
 {topology})

@@ -11,6 +11,5 @@ GEARS = Effect(
     numbers={"coupling_numbers": "ratio offset"},  # second coordinate = ratio * first + offset
     compose={
         "closures": {"closures": "<equations.gears.make_coupled_closing>({file.tree})"},
-        "observe": {"couplings": "<equations.gears.take_off_first_joints>"},
     },
 )

@@ -64,7 +64,6 @@ JOINT_FRICTION = Effect(
             "friction": "(<equations.joint_friction.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
             "<equations.joint_friction.load_drives>)"
         },
-        "observe closures": {"friction": "<equations.joint_friction.take_off_closures>"},
     },
     ledger=True,
     guards=True,

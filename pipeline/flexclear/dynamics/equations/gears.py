@@ -14,7 +14,7 @@ from flexclear.dynamics.equations import closures
 from flexclear.dynamics.equations.closures import wrench_row
 from flexclear.dynamics.gauge import bias, counted
 from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import add_wrench, dot_wrench, scale
+from flexclear.dynamics.vectors import dot_wrench, scale
 
 
 @kernel
@@ -57,19 +57,6 @@ def locate(d):
         else:
             row(d, c)
             jacobian(d, c)
-
-
-@kernel
-def take_off_first_joints(d):
-    """Subtract the wrenches of couplings on their first joints from the links that they act on."""
-    for c in range(d.n_closures):
-        closure = d.closures[c]
-        if closure.coupling >= 0 and closure.n_kept > 0:
-            size, wrench = d.multiplier[closure.kept0], d.rows[wrench_row(d, c, 1)]
-            gauge = d.gauges[d.couplings[closure.coupling].first]
-            a, b = d.wrench[d.sites[gauge.a].link], d.wrench[d.sites[gauge.b].link]
-            add_wrench(b, scale(-size, wrench.moment), scale(-size, wrench.force))
-            add_wrench(a, scale(size, wrench.moment), scale(size, wrench.force))
 
 
 def make_coupled_closing(tree: Any) -> closures.Closing:

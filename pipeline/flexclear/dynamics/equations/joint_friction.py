@@ -41,7 +41,6 @@ from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.vectors import (
     ZERO,
     add,
-    add_wrench,
     at,
     axis,
     cross,
@@ -408,17 +407,3 @@ def load_drives(d):
             for e in range(joint.bearing0, joint.bearing0 + joint.n_bearings):
                 bearing = d.bearing[e]
                 d.drive_force[drive] -= entry.sign * bearing.load * unit_power(bearing, d.columns[entry.column])
-
-
-@kernel
-def take_off_closures(d):
-    """Add friction of joints that close loops to their wrenches; subtract it from their links."""
-    for e in range(d.n_bearings):
-        joint, bearing = d.rubbing[d.bearings[e].joint], d.bearing[e]
-        if joint.closure < 0:
-            continue
-        a, b = d.wrench[d.sites[joint.site_a].link], d.wrench[d.sites[joint.site_b].link]
-        moment, force = scale(bearing.load, bearing.unit_moment), scale(bearing.load, bearing.unit_force)
-        add_wrench(d.closure_wrench[joint.closure], moment, force)
-        add_wrench(b, scale(-1.0, moment), scale(-1.0, force))
-        add_wrench(a, moment, force)

@@ -9,6 +9,7 @@ from typing import Any
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact.wear import LEDGER
+from flexclear.dynamics.loads.lookup import length
 from flexclear.dynamics.mechanics.contacts import stop, touch
 from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.loads import STATES, Law, act
@@ -16,7 +17,7 @@ from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link,
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Site
 from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
-from flexclear.dynamics.routines.calls import MODES, RATES, STATE, Cell, cells
+from flexclear.dynamics.routines.calls import MODES, RATES, SCENE, STATE, Cell, Span, cells
 
 #: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
 Gauge: Any = namedtuple("Gauge", "turning side axis sine_f sine_g cosine_f cosine_g")
@@ -103,9 +104,8 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
         kind = tuple(name.split(maxsplit=1))
         states, rates = _internal(tables, int(row["internal0"]), STATES.get(kind[0], 0))
         reading = _Reading(tables, frames, [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]])
-        for k in (row["gauge"], row["measured"]):
-            if k >= 0:
-                reading.coordinate(k)
+        own = [reading.coordinate(k) for k in (row["gauge"], row["measured"]) if k >= 0]
+        shown = ("coordinate", own[-1]) if own else ("distance" if row["a"] >= 0 else "nothing", 0)
         read = []
         for i, index in enumerate(looks["index"][slice(*look)].tolist()):
             joint = {f"q{i}", f"r{i}"}.intersection(name.split())
@@ -113,15 +113,26 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
         given = (
             kind,
             int(row["follows"]),
-            tables.row(m.LOAD_NUMBERS, number[0], number[1] - number[0]),
+            _numbers(tables, name, *number),
             [Law(*tables.record("law", k)[:2]) for k in range(*law)],
             states,
             reading.gauged,
             read,
+            shown if tables.recorded else (),
         )
-        bends = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
-        made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
+        results = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
+        results += tables.row(m.LOAD, len(made)) if tables.recorded else []
+        made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *results], int(row["book"])))
     return made
+
+
+def _numbers(tables: Tables, name: str, first: int, end: int) -> list[Cell | Span]:
+    """Return the numbers of a load, then a span for each table that its expressions look up (`scene.formulas`)."""
+    looked_up = sorted({one for one in name.split() if ":" in one}, key=lambda one: int(one[1:].partition(":")[0]))
+    sizes = [length(tuple(map(int, one.split(":")[1:]))) for one in looked_up]
+    found = tables.row(m.LOAD_NUMBERS, first, end - first)
+    begins = [len(found) - sum(sizes[k:]) for k in range(len(sizes))]
+    return [*found[: begins[0] if begins else None], *(Span(SCENE, found[at].index) for at in begins)]
 
 
 def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[Any, tuple[Any, ...], list[Frame], list[Cell]]:
@@ -146,12 +157,12 @@ def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier])
             one = table(m.NAMED["bearings"])[e]
             what, numbers = Bearing(*(int(one[name]) for name in Bearing._fields)), tables.record("bearing_numbers", e)
             bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
-            bends, load = tables.row(m.NAMED["bends"], e), tables.record("bearing", e).load
-            given = what, laws[one["law"]], numbers, bristle
-            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:]))
+            bends, (load, *rest) = tables.row(m.NAMED["bends"], e), tables.row(m.NAMED["bearing"], e)
+            given, record = (what, laws[one["law"]], numbers, bristle), rest if tables.recorded else []
+            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:], record))
         link = carriers[row["link"]] if row["link"] >= 0 else None
         if isinstance(link, Link):
-            link.rubbed = True
+            link.watched = True
         joint, second = (frames[row["site_a"]], frames[row["site_b"]]), -1 if row["reversed"] else 1
         made.append(Rubbing(joint, link, second, int(row["closure"]), bearings, slot + k))
     return made

@@ -28,7 +28,7 @@ from flexclear.dynamics.mechanics.surfaces import across
 from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, carried, on_both
 from flexclear.dynamics.mechanics.vectors import ZERO, Matrix, Twist, Vector, Wrench, cross, dot
 from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.routines.symbols import larger, repeat, select, sqrt
+from flexclear.dynamics.routines.symbols import larger, select, sqrt
 
 #: most Newton iterations; change of the loads, as a fraction of the largest, at which they end, and below which they
 #: end when it stops shrinking; strides in which friction is increased where they fail; pivots that count as zero
@@ -68,6 +68,15 @@ def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, 
     else:
         unit = Wrench((numbers.radius * force[1]) * n, force[0] * n)
     return (slip, rate if bristle else ()), on_both((a, b), G, unit), unit, -dot(force, slip), R
+
+
+@routine
+def recorded(slip: Vector, loss: Any, unit: Wrench, b: End) -> tuple[Any]:
+    """Return what the record has of a bearing besides its load (`memory`): all but the sliding speed per normal force.
+
+    slip, loss, unit: see `friction_of`.
+    """
+    return ((sqrt(dot(slip, slip)), loss, unit.about(carried(*b).p_WB)),)
 
 
 @routine
@@ -125,66 +134,66 @@ def pressure(bearing: Any, numbers: Any, R_WB: Matrix, reaction: Wrench) -> Pres
 
 
 @routine
-def loads_of(
-    bearings: Sequence[tuple[Any, Any, Matrix]],
-    smooth: Sequence[Wrench],
-    influence: Sequence[Sequence[Wrench]],
+def pressed(
+    bearing: Any, numbers: Any, R_WB: Matrix, smooth: Wrench, parts: Sequence[Wrench], loads: Numbers, share: Any
 ) -> Any:
-    """Return the normal forces of all bearings, their parts with kinks, and 1 where friction jams them, else 0.
+    """Return the normal force of a bearing, its parts with kinks, and minus its slopes by the loads of all bearings.
 
-    smooth: reaction of each bearing's joint without friction.  influence: per normal force of each bearing.
+    smooth: reaction of its joint without friction.  parts: per normal force of each bearing.  share: of friction.
     """
+    reaction = smooth
+    for part, load in zip(parts, loads, strict=True):
+        reaction = reaction + part * (share * load)
+    now = pressure(bearing, numbers, R_WB, reaction)
+    slopes = [-(share * (dot(now.by_M, part.moment) + dot(now.by_F, part.force))) for part in parts]
+    return now.size, now.bends, slopes
 
-    def pressures(loads: Numbers, share: Any) -> list[Pressure]:
-        found = []
-        for bearing, reaction, parts in zip(bearings, smooth, influence, strict=True):
-            for part, load in zip(parts, loads, strict=True):
-                reaction = reaction + part * (share * load)
-            found.append(pressure(*bearing, reaction))
-        return found
 
-    def correct(loads: Numbers, share: Any) -> tuple[list[Any], Any]:
-        """Return the correction of the loads by Newton's method, and the sign of the determinant of the slopes."""
-        now = pressures(loads, share)
-        slopes = [
-            [
-                float(e == k) - share * (dot(one.by_M, part.moment) + dot(one.by_F, part.force))
-                for k, part in enumerate(parts)
-            ]
-            for e, (one, parts) in enumerate(zip(now, influence, strict=True))
-        ]
-        return solution(slopes, [load - one.size for load, one in zip(loads, now, strict=True)])
+@routine
+def excess(load: Any, size: Any) -> Any:
+    """Return by how much a load exceeds the normal force that follows from it."""
+    return load - size
 
-    without = [pressure(*bearing, reaction).size for bearing, reaction in zip(bearings, smooth, strict=True)]
 
-    def pursue(state: Any) -> tuple[Any, Any]:
-        """Do one iteration; where full friction fails, increase it in strides."""
-        loads, share, turns, before, strides, _ = state
-        corrections, sign = correct(loads, share)
-        loads = [load - correction for load, correction in zip(loads, corrections, strict=True)]
-        change = largest = 0.0
-        for load, correction in zip(loads, corrections, strict=True):
-            change, largest = larger(change, abs(correction)), larger(largest, abs(load))
-        stalled = select(change <= ROUNDED * largest, select(change > 0.5 * before, FOUND, GOES_ON), GOES_ON)
-        made = select(change <= CONVERGED * largest, FOUND, stalled)
-        made = select(made == FOUND, select(sign > 0.0, FOUND, FAILED), select(turns < ITERATIONS - 1.0, made, FAILED))
-        made = select(sign == 0.0, FAILED, select(largest < inf, made, FAILED))
-        goes_on, failed = made == GOES_ON, made == FAILED
-        loads = [select(failed, one, load) for one, load in zip(without, loads, strict=True)]
-        jammed = select(failed, strides, 0.0)
-        following = select(failed, 0.0, share) + 1.0 / STRIDES
-        more = select(failed, 1.0 - strides, select(following <= 1.0, 1.0, 0.0))
-        return select(goes_on, 1.0, more) > 0.5, (
-            loads,
-            select(goes_on, share, following),
-            select(goes_on, turns + 1.0, 0.0),
-            select(goes_on, change, inf),
-            select(failed, 1.0, strides),
-            jammed,
-        )
+@routine
+def corrected(
+    corrections: Numbers,
+    sign: Any,
+    without: Numbers,
+    loads: Numbers,
+    share: Any,
+    turns: Any,
+    before: Any,
+    strides: Any,
+    _: Any,
+) -> tuple[Any, Any]:
+    """Return the state after an iteration of Newton's method, behind 1 where it goes on; where full friction fails,
+    increase it in strides.
 
-    loads, *_, jammed = repeat(pursue, (without, 1.0, 0.0, inf, 0.0, 0.0))
-    return (loads, [one.bends for one in pressures(loads, 1.0)]), jammed
+    sign: of the determinant of the slopes.  without: loads without friction.  The state are loads, share of friction,
+    iterations with it, their last change, 1 for strides, and 1 where friction jams the bearings.
+    """
+    loads = [load - correction for load, correction in zip(loads, corrections, strict=True)]
+    change = largest = 0.0
+    for load, correction in zip(loads, corrections, strict=True):
+        change, largest = larger(change, abs(correction)), larger(largest, abs(load))
+    stalled = select(change <= ROUNDED * largest, select(change > 0.5 * before, FOUND, GOES_ON), GOES_ON)
+    made = select(change <= CONVERGED * largest, FOUND, stalled)
+    made = select(made == FOUND, select(sign > 0.0, FOUND, FAILED), select(turns < ITERATIONS - 1.0, made, FAILED))
+    made = select(sign == 0.0, FAILED, select(largest < inf, made, FAILED))
+    goes_on, failed = made == GOES_ON, made == FAILED
+    loads = [select(failed, one, load) for one, load in zip(without, loads, strict=True)]
+    jammed = select(failed, strides, 0.0)
+    following = select(failed, 0.0, share) + 1.0 / STRIDES
+    more = select(failed, 1.0 - strides, select(following <= 1.0, 1.0, 0.0))
+    return select(goes_on, 1.0, more), (
+        loads,
+        select(goes_on, share, following),
+        select(goes_on, turns + 1.0, 0.0),
+        select(goes_on, change, inf),
+        select(failed, 1.0, strides),
+        jammed,
+    )
 
 
 @routine
@@ -193,25 +202,53 @@ def lost(load: Any, loss: Any) -> Any:
     return load * loss
 
 
-def solution(A: Sequence[Sequence[Any]], b: Numbers) -> tuple[list[Any], Any]:
-    """Return x of A x = b by elimination with the largest pivots, and the sign of det A, 0 where it counts as zero."""
-    rows, sign = [[*row, right] for row, right in zip(A, b, strict=True)], 1.0
-    for k in range(len(rows)):
-        for i in range(k + 1, len(rows)):
-            exchange = abs(rows[i][k]) > abs(rows[k][k])
-            both = list(zip(rows[k], rows[i], strict=True))
-            rows[k] = [select(exchange, other, one) for one, other in both]
-            rows[i] = [select(exchange, one, other) for one, other in both]
-            sign = select(exchange, -sign, sign)
-        pivot = rows[k][k]
-        sign = select(abs(pivot) > SINGULAR, select(pivot > 0.0, sign, -sign), 0.0)
-        for i in range(k + 1, len(rows)):
-            factor = rows[i][k] / pivot
-            rows[i] = [one - factor * above for one, above in zip(rows[i], rows[k], strict=True)]
+@routine
+def pivoted(above: Numbers, below: Numbers, sign: Any) -> tuple[Numbers, Numbers, Any]:
+    """Return two rows with the larger pivot in the first one, and the sign of the determinant."""
+    exchange, both = abs(below[0]) > abs(above[0]), list(zip(above, below, strict=True))
+    return (
+        [select(exchange, other, one) for one, other in both],
+        [select(exchange, one, other) for one, other in both],
+        select(exchange, -sign, sign),
+    )
+
+
+@routine
+def signed(pivot: Any, sign: Any) -> Any:
+    """Return the sign of the determinant with a pivot, 0 where that counts as zero."""
+    return select(abs(pivot) > SINGULAR, select(pivot > 0.0, sign, -sign), 0.0)
+
+
+@routine
+def eliminated(above: Numbers, below: Numbers) -> Numbers:
+    """Return what remains of a row without its first unknown."""
+    factor = below[0] / above[0]
+    return [one - factor * other for one, other in zip(below[1:], above[1:], strict=True)]
+
+
+@routine
+def substituted(row: Numbers, known: Numbers) -> Any:
+    """Return the first unknown of a row from the others."""
+    rest = row[-1]
+    for factor, one in zip(row[1:-1], known, strict=True):
+        rest = rest - factor * one
+    return rest / row[0]
+
+
+def solution(rows: Sequence[Numbers]) -> tuple[list[Any], Any]:
+    """Return x of A x = b by elimination with the largest pivots, and the sign of det A, 0 where it counts as zero.
+
+    rows: of A, each followed by its entry of b.
+    """
+    waiting, above, sign = list(rows), list[Numbers](), 1.0
+    while waiting:
+        first = waiting.pop(0)
+        for i, row in enumerate(waiting):
+            first, waiting[i], sign = pivoted(first, row, sign)
+        sign = signed(first[0], sign)
+        waiting = [eliminated(first, row) for row in waiting]
+        above.append(first)
     x: list[Any] = []
-    for k, row in reversed(list(enumerate(rows))):
-        rest = row[-1]
-        for factor, known in zip(row[k + 1 : -1], x, strict=True):
-            rest = rest - factor * known
-        x.insert(0, rest / row[k])
+    for row in reversed(above):
+        x.insert(0, substituted(row, x))
     return x, sign

@@ -17,8 +17,9 @@ from flexclear.dynamics.mechanics.vectors import Vector, Wrench, cross
 from flexclear.dynamics.routines.symbols import shared
 
 
-def bushing(numbers: Numbers, before: Numbers, F: Motion, G: Motion) -> tuple[Wrench, Any, Any, Numbers]:
-    """Return the wrench on G, power of the unsymmetric stiffness, lost power [W], and the rotation vector's rate.
+def bushing(numbers: Numbers, before: Numbers, F: Motion, G: Motion) -> tuple[Wrench, Any, Any, Numbers, Any]:
+    """Return the wrench on G, power of the unsymmetric stiffness, lost power [W], the rotation vector's rate, and the
+    stored energy [J].
 
     numbers: K, C and (K^T - K)/2, row by row.  before: rotation vector that the present one continues, if any.
     """
@@ -37,10 +38,11 @@ def bushing(numbers: Numbers, before: Numbers, F: Motion, G: Motion) -> tuple[Wr
 
     theta_rate = turned(spin, -0.5)
     s, s_rate = [*x, *theta], [*x_rate, *theta_rate]
-    damped = _product(C, s_rate)
-    along = [-(one + other) for one, other in zip(_product(K, s), damped, strict=True)]
+    elastic, damped = _product(K, s), _product(C, s_rate)
+    along = [-(one + other) for one, other in zip(elastic, damped, strict=True)]
     wrench = Wrench(F.R_WB @ turned(Vector(along[3:]), 0.5), F.R_WB @ Vector(along[:3]))
-    return wrench, _dot(_product(circulating, s), s_rate), _dot(damped, s_rate), theta_rate if before else ()
+    power, rates = _dot(_product(circulating, s), s_rate), theta_rate if before else ()
+    return wrench, power, _dot(damped, s_rate), rates, 0.5 * _dot(elastic, s)
 
 
 def _product(A: Numbers, s: Numbers) -> list[Any]:

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from flexclear.dynamics.mechanics.trees import Gains, Motion, Numbers, Site, Step, carried
-from flexclear.dynamics.mechanics.vectors import ZERO, Wrench, cross, dot
+from flexclear.dynamics.mechanics.vectors import ZERO, Twist, Vector, Wrench, cross, dot
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.routines.symbols import larger, select, smaller, sqrt
 
@@ -92,6 +92,30 @@ def less(V: Rows, forces: Numbers, gamma: Numbers, S: Rows) -> tuple[Numbers, Ro
 def inwards(step: Step, wrenches: Wrenches) -> Wrenches:
     """Return wrenches on a body about the origin of the one that carries it."""
     return [wrench.about(step.p_PB) for wrench in wrenches]
+
+
+@routine
+def along(columns: Sequence[Sequence[Twist]], wrenches: Sequence[Wrenches]) -> Rows:
+    """Return the forces along coordinates by their motions, summed over frames: per coordinate one for each row."""
+    both = list(zip(columns, wrenches, strict=True))
+    parts = [[[wrench.on(s) for wrench in on_it] for s in motions] for motions, on_it in both]
+    return [[sum(one, 0.0) for one in zip(*rows, strict=True)] for rows in zip(*parts, strict=True)]
+
+
+@routine
+def transmitted(wrenches: Wrenches, multipliers: Rows, p_WB: Vector, friction: Sequence[Any]) -> tuple[Wrench]:
+    """Return the wrench of a closure on its second body, about the origin of the world.
+
+    wrenches: of its rows there.  multipliers: without friction, by friction.  friction: loads of its bearings, and what
+    these do (`bearings.recorded`).
+    """
+    F = Wrench(ZERO, ZERO)
+    for wrench, *sizes in zip(wrenches, *multipliers, strict=True):
+        F = F + wrench * sum(sizes, 0.0)
+    F = F.about(p_WB)
+    for load, (_, _, *unit) in friction:
+        F = F + Wrench(Vector(unit[:3]), Vector(unit[3:])) * load
+    return (F,)
 
 
 @routine

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import inf
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -23,7 +24,7 @@ from flexclear.dynamics.routines.symbols import select
 
 @routine
 def status(reports: t.Numbers, sound: Any, least: Any, jammed: Any) -> tuple[Any]:
-    """Return the report of an evaluation, from those of `trees.eliminate`, `closures.cholesky` and `bearings.loads_of`.
+    """Return the report of an evaluation, from those of `trees.eliminate`, `closures.cholesky` and `loads_of`.
 
     reports: of a sound evaluation, of a jammed mechanism, of a singular pose, of massless coordinates.
     """
@@ -36,9 +37,9 @@ def status(reports: t.Numbers, sound: Any, least: Any, jammed: Any) -> tuple[Any
 REPORTS = (m.OK, m.JAMMED, m.SINGULAR, m.NOT_POSITIVE)
 
 
-def evaluated(mechanism: Mechanism, calls: CallList) -> CallList:
+def evaluated(mechanism: Mechanism, calls: CallList) -> Loops:
     """Append the calls that store the rates of the state, and what steps read besides: contacts, bearings and kinks of
-    loads, residuals of the loops, and the independence of their rows."""
+    loads, residuals of the loops, and the independence of their rows. Return the loops."""
     with calls.building():
         placed(mechanism)
         supplied = acted(mechanism, calls)
@@ -50,7 +51,7 @@ def evaluated(mechanism: Mechanism, calls: CallList) -> CallList:
         accelerated(mechanism, calls)
         calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_links(mechanism)]))
         calls.store([Cell(RESULTS, 0)], status, [calls.number(one) for one in REPORTS], sound, loops.least, jammed)
-    return calls
+    return loops
 
 
 def placed(mechanism: Mechanism) -> None:
@@ -97,11 +98,11 @@ def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
             if slowness:
                 need = need._replace(m=f.stiffened(need.m, modes.stiffness, slowness))
             modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
-        elif link.driven or link.rubbed:
+        elif link.driven or link.watched:
             link.rest = t.resist(link.motion, link.body, link.beyond)
         if link.driven:
             rest = t.carry(link.step, link.rest) if link.on_link else None
-        elif link.modes or link.rubbed:
+        elif link.modes or link.watched:
             rest, link.gains, link.forces, sound = t.free_joint(carried_on, link.rest, link.bounds, link.step, sound)
         else:
             given = carried_on, link.motion, link.body, link.bounds, link.step, link.beyond, sound
@@ -109,6 +110,10 @@ def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
         if rest:
             link.frame.resist(rest)
     return sound
+
+
+#: frames and wrenches on them, one for each row
+Ends = Sequence[tuple[Frame, c.Wrenches]]
 
 
 class Spread(NamedTuple):
@@ -119,12 +124,14 @@ class Spread(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """Closures that are solved for: their rows passed to the ground, with their wrenches on the second body, and their
-    multipliers, or what these must supply; the factor of their matrix, and its smallest pivot."""
+    """Closures that are solved for: their rows passed to the ground, with the frames and wrenches of their ends, and
+    their multipliers, and the part of these by friction in joints; the factor of their matrix, and its smallest
+    pivot."""
 
     found: dict[int, Spread]
-    on_second: dict[int, c.Wrenches]
+    ends: dict[int, Ends]
     multipliers: dict[int, t.Numbers]
+    by_friction: dict[int, t.Numbers]
     L: c.Blocks
     least: Any
 
@@ -136,14 +143,14 @@ class Loops(NamedTuple):
 def linked(mechanism: Mechanism, calls: CallList) -> Loops:
     """Pass the rows of all closures to the ground, and factorise their matrix."""
     found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
-    numbers, on_second = list[int](), dict[int, c.Wrenches]()
+    numbers, ends = list[int](), dict[int, Ends]()
     for number, one in enumerate(mechanism.closures):
-        kept, ends = len(one.scales), (frame.placed for frame in one.frames)
-        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *ends)
+        kept, places = len(one.scales), (frame.placed for frame in one.frames)
+        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *places)
         if not kept:
             continue
-        i = len(found)
-        mine, gamma, S[i, i] = passed_inwards(list(zip(one.frames, wrenches, strict=True)), gamma)
+        i, ends[number] = len(found), list(zip(one.frames, wrenches, strict=True))
+        mine, gamma, S[i, i] = passed_inwards(ends[number], gamma)
         for moved, V in mine.V.items():
             for k in moved_by.setdefault(moved, []):
                 before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
@@ -152,13 +159,12 @@ def linked(mechanism: Mechanism, calls: CallList) -> Loops:
         found.append(mine)
         right.append(gamma)
         numbers.append(number)
-        on_second[number] = wrenches[1]
     if not mechanism.closures:
-        return Loops({}, {}, {}, {}, 1.0)
+        return Loops({}, {}, {}, {}, {}, 1.0)
     L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
     calls.write([mechanism.least_pivot], [least])
     ways, supplied = (dict(zip(numbers, one, strict=True)) for one in (found, right))
-    return Loops(ways, on_second, supplied, L, least)
+    return Loops(ways, ends, supplied, {}, L, least)
 
 
 def closed(mechanism: Mechanism, calls: CallList) -> Loops:
@@ -213,6 +219,8 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
         ends, wrenches, units = [frame.placed for frame in joint.frames], list[Any](), list[Wrench]()
         for one in joint.bearings:
             on_both, unit, loss, R_WB = calls.store(one.sliding, b.friction_of, *one.given, *ends)
+            if one.record:
+                calls.store(one.record, b.recorded, one.sliding[:3], loss, unit, ends[1])
             wrenches.append(on_both)
             units.append(unit)
             losses.append(loss)
@@ -225,21 +233,50 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
     places = [one for joint in mechanism.rubbing for one in joint.bearings]
     loads, bends = [one.load for one in places], [cell for one in places for cell in one.bends]
     reactions = reactions_of(mechanism, loops, list(zip(influences, of_bearing, strict=True)))
-    jammed = calls.store([*loads, *bends], b.loads_of, bearings, *reactions)
+    found, kinks, jammed = loads_of(bearings, *reactions, calls)
+    calls.write([*loads, *bends], [*found, *kinks])
 
     for moved in moving(mechanism):
         V = [by.forces.get(moved, [0.0] * len(moved.forces)) for by in influences]
         moved.forces = c.with_multipliers(moved.forces, list(zip(*V, strict=True)), loads)
     for number, mine in loops.found.items():
         rows = list(zip(*(by.multipliers[number] for by in influences), strict=True))
-        more = c.with_multipliers([0.0] * len(rows), rows, loads)
+        more = loops.by_friction[number] = c.with_multipliers([0.0] * len(rows), rows, loads)
         for link, on_it in mine.through.items():
             link.closing.append((on_it, more))
-    for by, load in zip(influences, loads, strict=True):
+    for by, joint, load in zip(influences, of_bearing, loads, strict=True):
         for link, wrench in by.through.items():
-            link.closing.append(([wrench], [load]))
+            (link.own if link is joint.link else link.closing).append(([wrench], [load]))
     powers = [b.lost(*one) for one in zip(loads, losses, strict=True)]
     return [(joint.book, power) for joint, power in zip(of_bearing, powers, strict=True)], jammed
+
+
+def loads_of(
+    bearings: Sequence[tuple[Any, Any, Any]],
+    smooth: Sequence[Wrench],
+    influence: Sequence[Sequence[Wrench]],
+    calls: CallList,
+) -> tuple[list[Any], list[Any], Any]:
+    """Return the normal forces of all bearings, their parts with kinks, and 1 where friction jams them, else 0.
+
+    smooth: reaction of each bearing's joint without friction.  influence: per normal force of each bearing.
+    """
+
+    def pressed(loads: t.Numbers, share: Any) -> list[Any]:
+        return [
+            b.pressed(*one, R, parts, loads, share) for one, R, parts in zip(bearings, smooth, influence, strict=True)
+        ]
+
+    def pursue(state: Any) -> tuple[Any, Any]:
+        """Correct the loads once by Newton's method."""
+        rows, (loads, share, *_) = list[t.Numbers](), state
+        for e, (load, (size, _, slopes)) in enumerate(zip(loads, pressed(loads, share), strict=True)):
+            rows.append([*slopes[:e], t.added(1.0, slopes[e]), *slopes[e + 1 :], b.excess(load, size)])
+        return b.corrected(*b.solution(rows), without, *state)
+
+    without = [b.pressed(*one, R, [], [], 0.0)[0] for one, R in zip(bearings, smooth, strict=True)]
+    loads, *_, jammed = calls.repeat(pursue, (without, 1.0, 0.0, inf, 0.0, 0.0))
+    return loads, [bend for _, bends, _ in pressed(loads, 1.0) for bend in bends], jammed
 
 
 def moving(mechanism: Mechanism) -> list[Link | Modes]:
@@ -252,7 +289,7 @@ def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
     forces: dict[Link | Modes, t.Numbers] = {moved: [row[k] for row in V] for moved, V in spread.V.items()}
     right = list[Any]()
     for number, one in loops.found.items():
-        rows: c.Rows = [[0.0]] * len(loops.on_second[number])
+        rows: c.Rows = [[0.0]] * len(loops.ends[number][0][1])
         for moved, V in one.V.items():
             if moved in forces:
                 rows = c.coupled(rows, V, [[force] for force in forces[moved]])
@@ -298,7 +335,8 @@ def reaction(loops: Loops, joint: Rubbing, by: Influence | None = None, *, own: 
     bearing alone; own: True for a bearing of the joint itself."""
     second, link, multipliers = joint.frames[1].placed, joint.link, (by or loops).multipliers
     if link is None:
-        rows = loops.on_second.get(joint.closure, []), multipliers.get(joint.closure, [])
+        on_second = loops.ends[joint.closure][1][1] if joint.closure in loops.found else []
+        rows = on_second, multipliers.get(joint.closure, [])
         return b.reaction_in_loop(*rows, [by.unit] if by and own else [], second)
     passing = [(one.through[link], multipliers[number]) for number, one in loops.found.items() if link in one.through]
     if by and not own and link in by.through:
@@ -323,13 +361,57 @@ def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tup
 
 
 def passed_inwards(
-    ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers, on_shapes: Mapping[Link, c.Rows] = MappingProxyType({})
+    ends: Ends, gamma: t.Numbers, on_shapes: Mapping[Link, c.Rows] = MappingProxyType({})
 ) -> tuple[Spread, t.Numbers, c.Rows]:
-    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them; on_shapes: forces
-    on the shapes of links, per row."""
-    found, loads = Spread({}, {}), {link: list[tuple[c.Wrenches, Columns]]() for link in on_shapes}
-    waiting: dict[Link, c.Wrenches] = dict.fromkeys(on_shapes, [Wrench(ZERO, ZERO)] * len(gamma))
-    S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
+    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; on_shapes: forces on the shapes of links, per row."""
+    found, S = Spread({}, {}), [[0.0] * (i + 1) for i in range(len(gamma))]
+
+    def passed(link: Link, wrenches: c.Wrenches, loads: list[tuple[c.Wrenches, Columns]]) -> c.Wrenches:
+        nonlocal gamma, S
+        carried_on = int(link.on_link)
+        if modes := link.modes:
+            forces = on_shapes.get(link, [[0.0] * len(modes.forces)] * len(gamma))
+            modal = modes.gains, modes.forces, forces, loads, wrenches, gamma, S
+            found.V[modes], gamma, S, wrenches = f.spread(*modal)
+        if link.driven or link.watched:
+            found.through[link] = wrenches
+        if not link.gains:
+            return c.inwards(link.step, wrenches) if carried_on else []
+        given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
+        found.V[link], gamma, S, on_parent = c.spread(*given)
+        return on_parent
+
+    to_the_ground(ends, passed, dict.fromkeys(on_shapes, [Wrench(ZERO, ZERO)] * len(gamma)))
+    return found, gamma, S
+
+
+def jacobian(ends: Ends) -> dict[Link | Modes, c.Rows]:
+    """Return J^T of rows by what they move, per coordinate or shape a number for each row."""
+    found = dict[Link | Modes, c.Rows]()
+
+    def passed(link: Link, wrenches: c.Wrenches, loads: list[tuple[c.Wrenches, Columns]]) -> c.Wrenches:
+        if modes := link.modes:
+            found[modes] = c.along([columns for _, columns in loads], [given for given, _ in loads])
+        if not link.driven:
+            found[link] = c.along([link.step.S], [wrenches])
+        return c.inwards(link.step, wrenches) if link.on_link else []
+
+    to_the_ground(ends, passed)
+    return found
+
+
+def to_the_ground(
+    ends: Ends,
+    passed: Callable[[Link, c.Wrenches, list[tuple[c.Wrenches, Columns]]], c.Wrenches],
+    on_links: Mapping[Link, c.Wrenches] = MappingProxyType({}),
+) -> None:
+    """Pass wrenches on frames to the ground, from leaves on.
+
+    passed: returns what a link passes to its parent of all wrenches on it; it has those that act at its frames, too,
+    each with the motion of its frame per rate of each shape.  on_links: wrenches on links besides.
+    """
+    waiting = dict(on_links)
+    loads = {link: list[tuple[c.Wrenches, Columns]]() for link in on_links}
 
     def receive(frame: Frame, wrenches: c.Wrenches) -> None:
         link = frame.carrier
@@ -341,20 +423,7 @@ def passed_inwards(
         receive(frame, wrenches)
     while waiting:
         link = max(waiting, key=lambda link: link.depth)
-        wrenches, carried_on = waiting.pop(link), int(link.on_link)
-        if modes := link.modes:
-            forces = on_shapes.get(link, [[0.0] * len(modes.forces)] * len(gamma))
-            modal = modes.gains, modes.forces, forces, loads[link], wrenches, gamma, S
-            found.V[modes], gamma, S, wrenches = f.spread(*modal)
-        if link.driven or link.rubbed:
-            found.through[link] = wrenches
-        if link.gains:
-            given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
-            found.V[link], gamma, S, passed = c.spread(*given)
-        else:
-            passed = c.inwards(link.step, wrenches) if carried_on else []
-        receive(link.frame, passed)
-    return found, gamma, S
+        receive(link.frame, passed(link, waiting.pop(link), loads[link]))
 
 
 def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
@@ -362,7 +431,7 @@ def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
     powers = list[tuple[int, Any]]()
     for link in mechanism.links:
         if link.driven:
-            given = link.step, link.rest, link.acceleration, link.closing, link.coordinates.u
+            given = link.step, link.rest, link.acceleration, [*link.closing, *link.own], link.coordinates.u
             powers.append((link.book, t.driving_power(*given)))
         if modes := link.modes:
             powers.append((modes.book, f.damping_power(modes.body.damping, modes.u)))

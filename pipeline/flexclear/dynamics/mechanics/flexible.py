@@ -231,15 +231,13 @@ def need(
     forces that the modes need, of the elastic energy.
     """
     n, R = len(q), motion.R_WB
-    P, V, bent = [list(row) for row in body.E], *([[0.0] * n for _ in range(9)] for _ in range(2))
+    V, bent = ([[0.0] * n for _ in range(9)] for _ in range(2))
     for (row, i, j), (position, rate) in zip(places, body.moments, strict=True):
-        P[row][j] = P[row][j] + position * q[i]
         V[row][j] = V[row][j] + rate * u[i]
         bent[row][j] = bent[row][j] + position * u[i]
-    Q = [body.second[r] + _dot(body.E[3 * (r % 3) + r // 3], q) + _dot(P[r], q) for r in range(9)]
+    (P, J), moved = bulk(places, body, q), displacement(body.moves, q, u)
     D, drift = (Matrix([_dot(row, u) for row in rows]) for rows in (P, bent))
-    J, spins = tensor(Q), [axial(column) for column in zip(*P, strict=True)]
-    moved = displacement(body.moves, q, u)
+    spins = [axial(column) for column in zip(*P, strict=True)]
 
     omega, alpha, a = (R.T @ v for v in (motion.omega, motion.alpha, motion.a))
     c, v = body.first + moved.by, moved.rate
@@ -266,6 +264,14 @@ def need(
     return Need(I, F, moving, m, forces)
 
 
+def bulk(places: Places, body: Modal, q: Numbers) -> tuple[Rows, Symmetric]:
+    """Return P, nine rows, and the inertia tensor about the origin of the body; places: see `need`."""
+    P = [list(row) for row in body.E]
+    for (row, i, j), (position, _) in zip(places, body.moments, strict=True):
+        P[row][j] = P[row][j] + position * q[i]
+    return P, tensor([body.second[r] + _dot(body.E[3 * (r % 3) + r // 3], q) + _dot(P[r], q) for r in range(9)])
+
+
 def tensor(Q: Numbers) -> Symmetric:
     """Return the inertia tensor tr(Q) 1 - Q of a second moment, of which only the symmetric part counts."""
     across = (-0.5 * (Q[1] + Q[3]), -0.5 * (Q[2] + Q[6]), -0.5 * (Q[5] + Q[7]))
@@ -277,23 +283,27 @@ def axial(M: Numbers) -> Vector:
     return Vector([M[5] - M[7], M[6] - M[2], M[1] - M[3]])
 
 
+def section(station: Station, q: Numbers) -> tuple[Vector, Vector, Any, Any, Vector]:
+    """Return rotation and curvature at a station, cosine and sine of its twist, and the strain in twisted axes."""
+    theta, kappa = (weighted(by_mode(rows), q) for rows in (station.rotation, station.curvature))
+    c, s = cos(theta[0]), sin(theta[0])
+    twist = kappa[0] - 0.5 * (theta[1] * kappa[2] - theta[2] * kappa[1])
+    return theta, kappa, c, s, Vector([twist, c * kappa[1] + s * kappa[2], c * kappa[2] - s * kappa[1]])
+
+
 @routine
 def bend(forces: Numbers, station: Station, q: Numbers) -> list[Any]:
     """Add the forces of a rod's elastic energy beyond that of its modal stiffness, at a station, to those on modes.
 
     Rods resist bending in the axes of their twisted sections, and bending across bending twists them.
     """
-    turns, curves = by_mode(station.rotation), by_mode(station.curvature)
-    theta, kappa = weighted(turns, q), weighted(curves, q)
-    c, s = cos(theta[0]), sin(theta[0])
-    twist = kappa[0] - 0.5 * (theta[1] * kappa[2] - theta[2] * kappa[1])
-    strain = Vector([twist, c * kappa[1] + s * kappa[2], c * kappa[2] - s * kappa[1]])
+    theta, kappa, c, s, strain = section(station, q)
     torque, m2, m3 = station.stiffness @ strain
     half = 0.5 * torque
     on_rotation = Vector([m2 * strain[2] - m3 * strain[1], -half * kappa[2], half * kappa[1]])
     on_curvature = Vector([torque, c * m2 - s * m3 + half * theta[2], s * m2 + c * m3 - half * theta[1]])
     on_curvature = on_curvature - station.stiffness @ kappa
-    both = zip(forces, turns, curves, strict=True)
+    both = zip(forces, by_mode(station.rotation), by_mode(station.curvature), strict=True)
     return [f + dot(on_rotation, turn) + dot(on_curvature, curve) for f, turn, curve in both]
 
 
@@ -368,6 +378,46 @@ def accelerate(basis: Places, T: Numbers, u: Numbers, gains: Gains, forces: Numb
 def follow(a: Twist, columns: Columns, accelerations: Numbers) -> Twist:
     """Return the acceleration at a port, from that of the body as if rigid, with the part of its shapes."""
     return a + total(columns, accelerations)
+
+
+@routine
+def energies(
+    places: Places,
+    basis: Places,
+    motion: Motion,
+    body: Modal,
+    q: Numbers,
+    u: Numbers,
+    gravity: Vector,
+    kinetic: Any,
+    potential: Any,
+    elastic: Any,
+) -> tuple[Any, Any, Any]:
+    """Return sums with the kinetic energy of a body, its potential energy of gravity, and that of its modal stiffness.
+
+    The arguments are those of `need`.
+    """
+    (P, J), moved, R, p = (
+        bulk(places, body, q),
+        displacement(body.moves, q, u),
+        motion.R_WB,
+        in_shapes(basis, body.T, u),
+    )
+    omega, v, c = R.T @ motion.omega, R.T @ motion.v, body.first + moved.by
+    speeding = cross(omega, c) + moved.rate
+    moving = 0.5 * body.mass * dot(v, v) + dot(v, speeding) + 0.5 * dot(omega, J @ omega)
+    moving = moving + dot(omega, axial([_dot(row, u) for row in P]))
+    for i, row in enumerate(body.mass_of_shapes):
+        moving = moving + p[i] * (_dot(row[:i], p[:i]) + 0.5 * row[i] * p[i])
+    bent = 0.5 * _dot(body.stiffness, [one * one for one in q])
+    return kinetic + moving, potential - dot(gravity, body.mass * motion.p_WB + R @ c), elastic + bent
+
+
+@routine
+def bending_energy(station: Station, q: Numbers, elastic: Any) -> Any:
+    """Return the sum with a rod's elastic energy beyond that of its modal stiffness, at a station; see `bend`."""
+    _, kappa, _, _, strain = section(station, q)
+    return elastic + 0.5 * (dot(strain, station.stiffness @ strain) - dot(kappa, station.stiffness @ kappa))
 
 
 @routine

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 from flexclear.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.dynamics.mechanics.bushings import bushing
 from flexclear.dynamics.mechanics.coordinates import Along, along
+from flexclear.dynamics.mechanics.lookup import curve, surface
 from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, carried, on_both
 from flexclear.dynamics.mechanics.vectors import UNIT, ZERO, Matrix, Vector, Wrench, dot
 from flexclear.dynamics.routines import symbols
-from flexclear.dynamics.routines.calls import routine
+from flexclear.dynamics.routines.calls import Indexed, routine
 from flexclear.dynamics.routines.symbols import branch, larger, select, shared, smaller, sqrt
 from flexclear.scene.expression import BENT, fold
 from flexclear.scene.formulas import operands
@@ -29,8 +30,8 @@ class Law(NamedTuple):
 class Given(NamedTuple):
     """What a load may depend on. R_WL: axes of the components of a vector.
 
-    coordinates: that along which the load acts, then others that it measures.  read: frames and coordinates that an
-    expression names.
+    numbers: the load's own; then a span for each table.  coordinates: that along which the load acts, then others that
+    it measures.  read: frames and coordinates that an expression names.
     """
 
     numbers: Numbers
@@ -46,7 +47,7 @@ class Given(NamedTuple):
 class Load(NamedTuple):
     """What a load does: wrench on the second body about its frame's origin, power supplied and lost [W].
 
-    states: rates of its states.  bends: values at whose zeros, or at whose levels, it has kinks.
+    states: rates of its states.  bends: values at whose zeros, or at whose levels, it has kinks.  stored: energy [J].
     """
 
     wrench: Wrench
@@ -54,6 +55,7 @@ class Load(NamedTuple):
     lost: Any = 0.0
     states: Numbers = ()
     bends: Numbers = ()
+    stored: Any = 0.0
 
 
 # Along a joint coordinate -------------------------------------------------------------------------------------------
@@ -71,8 +73,9 @@ def joint_force(given: Given) -> Load:
 def joint_spring(given: Given) -> Load:
     """Return the force of a spring and a damper."""
     (stiffness, damping, rest), (value, rate, unit) = given.numbers, given.coordinates[0]
-    damped = damping * rate
-    return Load(unit * -(stiffness * (value - rest) + damped), lost=damped * rate)
+    stretch, damped = value - rest, damping * rate
+    stored = 0.5 * stiffness * stretch * stretch
+    return Load(unit * -(stiffness * stretch + damped), lost=damped * rate, stored=stored)
 
 
 def joint_friction(given: Given) -> Load:
@@ -118,9 +121,10 @@ def line(given: Given) -> tuple[Any, Any, Vector, Vector]:
 
 def spring_damper(given: Given) -> Load:
     """Return the force of a spring and a damper; its part -k r keeps its slope where the points coincide."""
-    (stiffness, damping, free), (_, rate, direction, r) = given.numbers, line(given)
-    damped = damping * rate
-    return Load(Wrench(ZERO, (stiffness * free - damped) * direction - stiffness * r), lost=damped * rate)
+    (stiffness, damping, free), (length, rate, direction, r) = given.numbers, line(given)
+    stretch, damped = length - free, damping * rate
+    wrench = Wrench(ZERO, (stiffness * free - damped) * direction - stiffness * r)
+    return Load(wrench, lost=damped * rate, stored=0.5 * stiffness * stretch * stretch)
 
 
 def line_expression(given: Given, formula: str) -> Load:
@@ -132,7 +136,8 @@ def line_expression(given: Given, formula: str) -> Load:
 
 def mount(given: Given) -> Load:
     """Return the wrench of a bushing."""
-    return Load(*bushing(given.numbers, given.states, given.F, given.G))
+    *load, stored = bushing(given.numbers, given.states, given.F, given.G)
+    return Load(*load, stored=stored)
 
 
 # On one point ---------------------------------------------------------------------------------------------------------
@@ -196,6 +201,10 @@ def evaluated(given: Given, formula: str) -> tuple[list[Any], list[Any]]:
     def apply(token: str, values: list[Any]) -> Any:
         if token in BENT:
             bends.append(values[0] - values[1] if len(values) == 2 else values[0])
+        if ":" in token:
+            table, *levels = map(int, token[1:].split(":"))
+            spans = [one for one in given.numbers if isinstance(one, Indexed)]
+            return (curve, surface)[len(levels) - 1](spans[table], *levels, *values)
         exponent = int(token[1:]) if token[0] == "^" and token[1:] else 0
         if exponent:
             product = reduce(mul, values * abs(exponent))
@@ -232,13 +241,15 @@ def act(
     states: Numbers,
     gauged: Sequence[tuple[Any, Numbers, int, int]],
     read: Sequence[tuple[int, int]],
+    shown: tuple[str, int] | tuple[()],
     *ends: End,
 ) -> Any:
     """Return the rates of a load's states and turns, and its bends; the wrenches on both bodies; its powers.
 
     kind: its type and, of an expression, the formula.  follows: 1 when its components are in axes of G.  gauged: of
     each coordinate the gauge, its turns, and the numbers of its frames among the ends.  read: (0, frame) or
-    (1, coordinate) of each that an expression names.
+    (1, coordinate) of each that an expression names.  shown: what the record, a row of `memory.LOAD` after the bends,
+    has for its length: a "coordinate", the "distance" of the frames, or "nothing"; () without record.
     """
     frames = [carried(*end) for end in ends]
     coordinates = [along(gauge, turns, frames[i], frames[j]) for gauge, turns, i, j in gauged]
@@ -247,4 +258,11 @@ def act(
     given = Given(numbers, laws, states, F, G, R_WL, coordinates, [(frames, coordinates)[sort][k] for sort, k in read])
     load = LOADS[kind[0]](given, *kind[1:])
     turning = [one.rate for one, (_, turns, _, _) in zip(coordinates, gauged, strict=True) if turns]
-    return (load.states, turning, load.bends), on_both(ends[:2], G, load.wrench), (load.power, load.lost)
+    stored = [load.states, turning, load.bends]
+    if shown:
+        (M, force), (what, k) = load.wrench.about(G.p_WB), shown
+        value, rate = (
+            coordinates[k][:2] if what == "coordinate" else line(given)[:2] if what == "distance" else (0.0, 0.0)
+        )
+        stored.append([force, M, value, rate, load.stored, load.power, load.lost])
+    return stored, on_both(ends[:2], G, load.wrench), (load.power, load.lost)

@@ -122,9 +122,10 @@ class Link(Carrier):
     """A body with the joint that carries it. Its numbers are in memory.
 
     frame: of the joint, on the parent.  body: of a rigid body.  modes: of a flexible one.  rates: where those of its
-    positions and speeds are stored.  book: of the ledger, for its drives.  rubbed: True when its joint rubs.  The
-    others follow as `trees` has them; closing: wrenches of the closures on it and all beyond, by rows, and the
-    multipliers; changes: of its speeds, by forces alone.
+    positions and speeds are stored.  book: of the ledger, for its drives.  watched: True when the wrench through its
+    joint is needed.  The others follow as `trees` has them; closing: wrenches of closures and of bearings on it and all
+    beyond, by rows, and their sizes; own: of the bearings of its joint, which that transmits; changes: of its speeds,
+    by forces alone.
     """
 
     frame: Frame
@@ -135,13 +136,14 @@ class Link(Carrier):
     rates: Cells = ()
     book: int = -1
     modes: Modes | None = None
-    rubbed: bool = False
+    watched: bool = False
     step: Step = field(init=False)
     rest: Resistance = field(init=False)
     gains: t.Gains = field(init=False, default=())
     forces: t.Numbers = field(init=False, default=())
     changes: t.Numbers = field(init=False, default=())
     closing: list[tuple[c.Wrenches, t.Numbers]] = field(init=False, default_factory=list)
+    own: list[tuple[c.Wrenches, t.Numbers]] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         self.depth = self.frame.carrier.depth + 1
@@ -195,13 +197,14 @@ class Rubbed(NamedTuple):
     """A bearing with friction. given: what it is, its law and its numbers, and the state of its bristles.
 
     sliding, load, bends: where its sliding velocity with the bristles' rate, its load, and the parts of that with kinks
-    are stored.
+    are stored.  record: where that is stored which only the record has (`bearings.recorded`).
     """
 
     given: tuple[Any, ...]
     sliding: Cells
     load: Cell
     bends: Cells
+    record: Cells
 
 
 class Rubbing(NamedTuple):
@@ -217,13 +220,15 @@ class Rubbing(NamedTuple):
 
 
 class Mechanism(NamedTuple):
-    """A mechanism. links: parents first, without the ground.  least_pivot: where the closures' smallest is stored.
+    """A mechanism. links: parents first, without the ground.  frames: all.  least_pivot: where the closures' smallest
+    is stored.
 
     ledger: where the rates are stored of those books that no action stores itself.
     """
 
     ground: Carrier
     links: Sequence[Link]
+    frames: Sequence[Frame]
     closures: Sequence[Closure]
     actions: Sequence[Action]
     rubbing: Sequence[Rubbing]

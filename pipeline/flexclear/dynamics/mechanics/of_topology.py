@@ -14,7 +14,8 @@ from flexclear.dynamics.mechanics.evaluation import evaluated
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
 from flexclear.dynamics.mechanics.joints import JOINTS
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
-from flexclear.dynamics.mechanics.responses import listed
+from flexclear.dynamics.mechanics.record import describe
+from flexclear.dynamics.mechanics.responses import LISTS, listed
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
@@ -24,10 +25,20 @@ from flexclear.dynamics.specialise.code import Program
 from flexclear.dynamics.specialise.topology import Topology
 
 
-def list_of(parts: Parts, topology: Topology, where: int = m.CALLS) -> CallList:
-    """Return the list of calls that evaluates a mechanism, or another one by the place of its address in h."""
-    mechanism, calls = mechanism_of(Tables(parts, topology)), CallList()
-    return evaluated(mechanism, calls) if where == m.CALLS else listed(mechanism, calls, where)
+def list_of(parts: Parts, topology: Topology, where: int = m.CALLS, calls: CallList | None = None) -> CallList:
+    """Return the list of calls that evaluates a mechanism, or another one by the place of its address in h.
+
+    In RECORD_CALLS it stores, as well, all that the record has of the mechanism.  calls: to which the calls are
+    appended.  See `evaluation.evaluated`, `record.describe` and `responses.listed`.
+    """
+    tables, made = Tables(parts, topology, where == m.RECORD_CALLS), CallList() if calls is None else calls
+    mechanism = mechanism_of(tables)
+    if where in LISTS:
+        return listed(mechanism, made, where)
+    loops = evaluated(mechanism, made)
+    if tables.recorded:
+        describe(tables, mechanism, loops, made)
+    return made
 
 
 def program_of(parts: Parts, topology: Topology, longest: int) -> Program:
@@ -52,7 +63,8 @@ def mechanism_of(tables: Tables) -> Mechanism:
         place(i - 1)
         numbers, modes = tables.row(m.LINK_NUMBERS, i), _modes(tables, flexible[i]) if i in flexible else None
         body, kind = Body(numbers[0], Vector(numbers[1:4]), Symmetric(numbers[4:10])), tables.parts.joints[row["joint"]]
-        links.append(Link(frames[-1], kind, body, Bounds(*numbers[10:]), *_joint_state(tables, row, kind), modes))
+        state = _joint_state(tables, row, kind)
+        links.append(Link(frames[-1], kind, body, Bounds(*numbers[10:]), *state, modes, tables.recorded))
         carriers.append(links[-1])
     for k in range(len(links), len(sites)):
         place(k)
@@ -66,7 +78,7 @@ def mechanism_of(tables: Tables) -> Mechanism:
         {k: cell for k, cell in books if cell.key not in stored},
         tables.stretch(m.PIVOT, m.LAST_PIVOT, 1),
     )
-    return Mechanism(ground, links, closures, actions, rubbing, tables.row(m.GRAVITY, 0), ledger, least)
+    return Mechanism(ground, links, frames, closures, actions, rubbing, tables.row(m.GRAVITY, 0), ledger, least)
 
 
 def _site(tables: Tables, table: Any, k: int) -> Site:

@@ -302,7 +302,12 @@ def follow(parent: Twist, step: Step) -> Twist:
 
 @routine
 def driving_power(step: Step, rest: Resistance, acceleration: Twist, closing: Sequence[Any], u: Numbers) -> Any:
-    """Return the power [W] that the drives of a joint supply at its speeds.
+    """Return the power [W] that the drives of a joint supply at its speeds; see `needed`."""
+    return needed(rest, acceleration, closing).on(total(step.S, u))
+
+
+def needed(rest: Resistance, acceleration: Twist, closing: Sequence[Any]) -> Wrench:
+    """Return the wrench that a body with all beyond it needs through its joint.
 
     acceleration: without the known part.  closing: of each closure the wrenches of its rows on the body and all beyond,
     and its multipliers.
@@ -311,4 +316,34 @@ def driving_power(step: Step, rest: Resistance, acceleration: Twist, closing: Se
     for wrenches, multipliers in closing:
         for wrench, size in zip(wrenches, multipliers, strict=True):
             F = F - wrench * size
-    return F.on(total(step.S, u))
+    return F
+
+
+# What is recorded -----------------------------------------------------------------------------------------------------
+@routine
+def driving_forces(step: Step, rest: Resistance, acceleration: Twist, closing: Sequence[Any]) -> tuple[Any]:
+    """Return the forces of the drives of a joint along its coordinates; see `needed`."""
+    F = needed(rest, acceleration, closing)
+    return ([F.on(s) for s in step.S],)
+
+
+@routine
+def transmitted(rest: Resistance, acceleration: Twist, closing: Sequence[Any], p_WB: Vector) -> tuple[Wrench]:
+    """Return the wrench on a body through its joint about the origin of the world; see `needed`."""
+    return (needed(rest, acceleration, closing).about(p_WB),)
+
+
+@routine
+def accelerated(body: Motion, site: Site, acceleration: Twist) -> tuple[Any]:
+    """Return the motion of a site on a body with its whole acceleration; acceleration: part that the body's lacks."""
+    F, more = carried(body, site), acceleration.at(body.R_WB @ site.p_BS)
+    return ((F.p_WB, F.R_WB, F.omega, F.v, F.alpha + more.angular, F.a + more.linear),)
+
+
+@routine
+def energies(motion: Motion, body: Body, gravity: Vector, kinetic: Any, potential: Any) -> tuple[Any, Any]:
+    """Return sums with the kinetic energy of a rigid body, and its potential energy of gravity."""
+    c, omega = motion.R_WB @ body.com, motion.R_WB.T @ motion.omega
+    v = motion.v + cross(motion.omega, c)
+    moving = 0.5 * (body.mass * dot(v, v) + dot(omega, body.J @ omega))
+    return kinetic + moving, potential - body.mass * dot(gravity, motion.p_WB + c)

@@ -37,6 +37,27 @@ class Cell:
         self.array, self.index, self.key = array, index, (array, index)
 
 
+class Span:
+    """Adjacent numbers in memory, of which a routine reads some at indices that are known only when the code runs."""
+
+    __slots__ = ("array", "index")
+
+    def __init__(self, array: str, index: int) -> None:
+        self.array, self.index = array, index
+
+
+class Indexed:
+    """A span in a routine: numbers by their index, an integer or a symbol. load: of the number at an index."""
+
+    __slots__ = ("load",)
+
+    def __init__(self, load: Callable[[Any], Any]) -> None:
+        self.load = load
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.load(index)
+
+
 class Code(NamedTuple):
     """A traced routine: name, operations, and the array of each run of adjacent numbers that a call locates.
 
@@ -68,6 +89,9 @@ class Call(NamedTuple):
     code: Code
     offsets: tuple[int, ...]
 
+
+#: goes back by as many entries as its second offset says, if the number at its first one exceeds one half
+BACK = Code("back", Program([], []), (RESULTS,))
 
 _building: ContextVar[CallList | None] = ContextVar("building", default=None)
 
@@ -130,7 +154,8 @@ class CallList:
         """Append a call and return its results; without the first of several, if cells are given to store that."""
         runs = _Runs()
         given = leaves(arguments)
-        inside = [runs.at(one) if type(one) is Cell else one for one in given]
+        places = {Cell: runs.at, Span: runs.span}
+        inside = [places[type(one)](one) if type(one) in places else one for one in given]
         targets = None if into is None else tuple(runs.at(cell) for cell in into)
         kind = (function, _shape(arguments), tuple(inside), targets, tuple(runs.arrays))
         if kind not in self._kinds:
@@ -156,6 +181,21 @@ class CallList:
         """Append a call that stores values in cells."""
         if cells:
             self.call(_same, (list(values),), cells)
+
+    def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
+        """Append calls of a loop, and return the state after it: nested tuples of numbers.
+
+        turn(state) -> (number, state) has one more turn where the number exceeds one half.
+        """
+        places = cells(RESULTS, self.size, len(leaves(state)))
+        self.size += len(places)
+        self.write(places, leaves(state))
+        present, begin, known = rebuilt(state, iter(places)), len(self.calls), self._known.copy()
+        goes_on, after = turn(present)
+        self.write(places, leaves(after))
+        self.calls.append(Call(BACK, (goes_on.index, len(self.calls) - begin)))
+        self._known = known  # what the loop has computed is of an earlier state
+        return present
 
 
 def _same(values: Any) -> Any:
@@ -185,6 +225,19 @@ class _Runs:
             self._seen[cell.key] = Argument(str(len(self.arrays) - 1), cell.index - self.begins[-1])
         return self._seen[cell.key]
 
+    def span(self, span: Span) -> Run:
+        """Return the run of a span, which no other number joins."""
+        self.arrays.append(span.array)
+        self.begins.append(span.index)
+        self._ends.append(-1)
+        return Run(str(len(self.arrays) - 1))
+
+
+class Run(NamedTuple):
+    """An argument that is a span: its run."""
+
+    run: str
+
 
 class Argument(NamedTuple):
     """An argument that is a symbol on the tape of a routine: its run and the offset there."""
@@ -198,10 +251,14 @@ def _traced(
 ) -> _Kind:
     """Trace a routine; inside: its numbers, symbolic ones by their run."""
     tape = new_tape()
-    symbols = [
-        tape.write(INTEGER if runs[int(a.run)] == MODES else FLOAT, "load", *a) if isinstance(a, Argument) else a
-        for a in inside
-    ]
+
+    def read(one: Any) -> Any:
+        if isinstance(one, Run):
+            return Indexed(lambda index: tape.write(FLOAT, "load", one.run, index))
+        kind = INTEGER if isinstance(one, Argument) and runs[int(one.run)] == MODES else FLOAT
+        return tape.write(kind, "load", *one) if isinstance(one, Argument) else one
+
+    symbols = [read(one) for one in inside]
     with inline():
         result = function(*rebuilt(arguments, iter(symbols)))
     first, rest = parted(result, into)

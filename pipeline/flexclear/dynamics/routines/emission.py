@@ -1,8 +1,8 @@
 """LLVM code of routines, and of the function that runs a list of their calls.
 
 The function is ``evaluate(h, f, w, n, t, y, dy)`` like that of kernels: it evaluates the laws of time at t, then calls
-each code of the list whose address is in h (`memory`), and reports in n the status that is the list's first result. The
-list is four words: number of calls, addresses of their codes, addresses of their offsets, address of the results.
+each code of the list whose address is at a place in h (`memory`), and reports in n the status that is the list's first
+result. The list is four words: number of calls, addresses of their codes and of their offsets, address of the results.
 For lists that do not evaluate, that address is a last argument.
 """
 
@@ -19,9 +19,9 @@ from flexclear.dynamics.specialise.code import Emitter
 #: name of the function in each text
 NAME = "routine"
 _WORD, _OFFSET, _FLOAT = ir.IntType(64), ir.IntType(32), ir.DoubleType()
-#: of routines: the arrays, and the offsets of the call's runs
+#: of routines, which return how many entries of the list to go on: the arrays, and the offsets of the call's runs
 _ROUTINE = ir.FunctionType(
-    ir.VoidType(), [*((_WORD if array == MODES else _FLOAT).as_pointer() for array in ARRAYS), _OFFSET.as_pointer()]
+    _WORD, [*((_WORD if array == MODES else _FLOAT).as_pointer() for array in ARRAYS), _OFFSET.as_pointer()]
 )
 _EVALUATE = ir.FunctionType(
     _WORD,
@@ -37,12 +37,21 @@ def routine_text(code: Code) -> str:
     for k, array in enumerate(code.runs):
         offset = builder.load(builder.gep(offsets, [_OFFSET(k)]))
         begins[str(k)] = builder.gep(arrays[array], [offset])
-    Emitter(builder, code.program, lambda run, k, lane: builder.gep(begins[run], [_OFFSET(k)])).emit()
-    builder.ret_void()
+
+    def where(run: str, k: Any, lane: int) -> Any:
+        return builder.gep(begins[run], [_OFFSET(k) if isinstance(k, int) else k])
+
+    Emitter(builder, code.program, where).emit()
+    onward: Any = _WORD(1)
+    if not code.program.stores:  # `calls.BACK`
+        again = builder.fcmp_ordered(">", builder.load(begins["0"]), _FLOAT(0.5))
+        entries = builder.sext(builder.load(builder.gep(offsets, [_OFFSET(1)])), _WORD)
+        onward = builder.select(again, builder.neg(entries), onward)
+    builder.ret(onward)
     return str(builder.module)
 
 
-def interpreter_text(place: int | None = m.CALLS) -> str:
+def interpreter_text(place: int | None) -> str:
     """Return the LLVM text of the function that runs the list of calls at a place of h, or one that it is given."""
     function, builder = _begun(_EVALUATE if place else ir.FunctionType(_WORD, [*_EVALUATE.args, _WORD]))
     h, f, w, n, t, y, dy, *given = function.args
@@ -59,10 +68,8 @@ def interpreter_text(place: int | None = m.CALLS) -> str:
     builder.position_at_end(loop)
     k = builder.phi(_WORD)
     code, where = (_read(builder, table, k) for table in (codes, offsets))
-    builder.call(
-        builder.inttoptr(code, _ROUTINE.as_pointer()), [*arrays, builder.inttoptr(where, _OFFSET.as_pointer())]
-    )
-    following = builder.add(k, _WORD(1))
+    routine, where = builder.inttoptr(code, _ROUTINE.as_pointer()), builder.inttoptr(where, _OFFSET.as_pointer())
+    following = builder.add(k, builder.call(routine, [*arrays, where]))
     k.add_incoming(_WORD(0), before)
     k.add_incoming(following, loop)
     builder.cbranch(builder.icmp_signed("<", following, count), loop, after)

@@ -21,6 +21,8 @@ from flexclear.dynamics.routines.calls import (
     WORK,
     CallList,
     Cell,
+    Indexed,
+    Span,
     inline,
     parted,
 )
@@ -41,14 +43,25 @@ class Numbers(CallList):
 
     def call(self, function: Callable, arguments: Any, into: Sequence[Cell] | None = None) -> Any:
         """Return the results of a call; without the first of several, if cells are given to store that."""
-        given = [self._arrays[one.array][self._place(one)] if type(one) is Cell else one for one in leaves(arguments)]
+        given = [self._read(one) if type(one) in (Cell, Span) else one for one in leaves(arguments)]
         with inline(), np.errstate(all="ignore"):
             first, rest = parted(function(*rebuilt(arguments, iter(given))), into)
         for cell, value in zip(into or (), leaves(first), strict=True):
             self._arrays[cell.array][self._place(cell)] = value
         return rest
 
-    def _place(self, cell: Cell) -> int:
+    def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
+        """Return the state after a loop."""
+        goes_on: Any = 1.0
+        while goes_on > 0.5:
+            goes_on, state = turn(state)
+        return state
+
+    def _read(self, one: Cell | Span) -> Any:
+        array, first = self._arrays[one.array], self._place(one)
+        return Indexed(lambda index: array[first + index]) if isinstance(one, Span) else array[first]
+
+    def _place(self, cell: Cell | Span) -> int:
         stretch, inside = topologies.split(cell.index)
         return int(inside if stretch < 0 else self._h[stretch] + inside)
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from flexclear.artifacts.disk import checked, disk_limits, publish, read_checked
 from flexclear.artifacts.paths import kernel_root
+from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
 from flexclear.dynamics.compile.folder import writable
 from flexclear.dynamics.routines.calls import CallList
@@ -74,11 +75,15 @@ class ListInstance:
         self.words = np.array(words, dtype=np.int64)
 
 
-def stored(topology: bytes, build: Callable[[], CallList], report: Callable[[str], None]) -> LoadedList:
-    """Return the list of a topology, from disk or built; `report` receives a message before routines are compiled."""
-    path = (
-        writable(kernel_root(), report) / f"flexclear_routine_list_{_name(_interpreter() + topology)}{functions.CODE}"
-    )
+def stored(
+    topology: bytes, build: Callable[[], CallList], report: Callable[[str], None], place: int | None = m.CALLS
+) -> LoadedList:
+    """Return the list of a topology, from disk or built; `report` receives a message before routines are compiled.
+
+    place: in the header, where its interpreter finds it; None where that is given the list.
+    """
+    name = _name(_interpreter(place) + topology)
+    path = writable(kernel_root(), report) / f"flexclear_routine_list_{name}{functions.CODE}"
     if path not in loaded:
         table = read_checked(path)
         at = functions.stored_codes(table["names"]) if table else None
@@ -86,35 +91,24 @@ def stored(topology: bytes, build: Callable[[], CallList], report: Callable[[str
             loaded[path] = _loaded(table, at)
         else:
             calls = build()
-            loaded[path] = load(calls, report)
+            loaded[path] = load(calls, report, place)
             with disk_limits(path.parent):
-                publish(path, checked(_table(calls)))
+                publish(path, checked(_table(calls, place)))
     return loaded[path]
 
 
-def load(calls: CallList, report: Callable[[str], None]) -> LoadedList:
-    """Return a list ready to run; `report` receives a message before routines are compiled."""
-    table = _table(calls)
-    texts: list[Callable[[], str]] = [interpreter_text, *(partial(routine_text, code) for code in calls.codes)]
+def load(calls: CallList, report: Callable[[str], None], place: int | None = m.CALLS) -> LoadedList:
+    """Return a list ready to run; the arguments are those of `stored`."""
+    table = _table(calls, place)
+    texts = [partial(interpreter_text, place), *(partial(routine_text, code) for code in calls.codes)]
     return _loaded(table, functions.assembled(dict(zip(table["names"], texts, strict=True)), report))
 
 
-def runner() -> int:
-    """Return the address of the function that runs a list which it is given."""
-    text = _runner()
-    return functions.assembled({_name(text.encode()): lambda: text}, lambda _: None).popitem()[1]
-
-
-@cache
-def _runner() -> str:
-    return interpreter_text(None)
-
-
-def _table(calls: CallList) -> dict[str, list]:
+def _table(calls: CallList, place: int | None) -> dict[str, list]:
     """Return a list as numbers: names of the interpreter and its codes, code of each call, and offsets of its runs."""
     number = {id(code): k for k, code in enumerate(calls.codes, start=1)}
     return {
-        "names": [_name(content) for content in (_interpreter(), *(code.digest for code in calls.codes))],
+        "names": [_name(content) for content in (_interpreter(place), *(code.digest for code in calls.codes))],
         "codes": [number[id(call.code)] for call in calls.calls],
         "counts": [len(call.offsets) for call in calls.calls],
         "offsets": [offset for call in calls.calls for offset in call.offsets],
@@ -131,9 +125,9 @@ def _loaded(table: dict[str, list], at: dict[str, int]) -> LoadedList:
 
 
 @cache
-def _interpreter() -> bytes:
+def _interpreter(place: int | None) -> bytes:
     """Return the interpreter's text, which reads places of h: the declarations of effects move them."""
-    return interpreter_text().encode()
+    return interpreter_text(place).encode()
 
 
 @cache

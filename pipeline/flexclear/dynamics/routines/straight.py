@@ -10,7 +10,20 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.routines.calls import MODES, RATES, RESULTS, SCENE, STATE, CallList, Cell, inline, parted
+from flexclear.dynamics.routines import symbols
+from flexclear.dynamics.routines.calls import (
+    MODES,
+    RATES,
+    RESULTS,
+    SCENE,
+    STATE,
+    CallList,
+    Cell,
+    Indexed,
+    Span,
+    inline,
+    parted,
+)
 from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.specialise.code import Program
@@ -29,12 +42,24 @@ class OneTape(CallList):
     def call(self, function: Callable, arguments: Any, into: Sequence[Cell] | None = None) -> Any:
         """Record a call and return its results; without the first of several, if cells are given to store that."""
         with inline():
-            given = [self._loaded(one) if type(one) is Cell else one for one in leaves(arguments)]
+            given = [self._loaded(one) if type(one) in (Cell, Span) else one for one in leaves(arguments)]
             first, rest = parted(function(*rebuilt(arguments, iter(given))), into)
         self._stored |= {cell.key: (cell, value) for cell, value in zip(into or (), leaves(first), strict=True)}
         return rest
 
-    def _loaded(self, cell: Cell) -> Any:
+    def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
+        """Record a loop, and return the state after it."""
+
+        def again(state: Any) -> tuple[Any, Any]:
+            goes_on, after = turn(state)
+            return goes_on > 0.5, after
+
+        return symbols.repeat(again, state)
+
+    def _loaded(self, cell: Cell | Span) -> Any:
+        if isinstance(cell, Span):
+            array, first = _place(cell)
+            return Indexed(lambda index: self._tape.write(FLOAT, "load", array, first + index))
         if cell.key in self._stored:
             return self._stored[cell.key][1]
         if cell.array == MODES:
@@ -48,7 +73,7 @@ class OneTape(CallList):
         return Program(self._tape.block, [*stores, ("n", m.ABRIDGED, 1)])
 
 
-def _place(cell: Cell) -> tuple[str, int]:
+def _place(cell: Cell | Span) -> tuple[str, int]:
     """Return array and index of a number."""
     if cell.array == RESULTS:
         return "n", m.EVALUATION

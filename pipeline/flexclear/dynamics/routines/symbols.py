@@ -6,11 +6,11 @@ A condition on symbols is known only when the code runs. It is written `branch`,
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from flexclear.dynamics.specialise.dual import function_of, plain
 from flexclear.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape
 from flexclear.dynamics.specialise.trace import Trace
 
@@ -32,22 +32,16 @@ def new_tape(longest: int = sys.maxsize) -> Tape:
     return Tape(_undecidable, longest)
 
 
-def _function(name: str, plain: Callable) -> Callable[..., Any]:
+def _function(name: str) -> Callable[..., Any]:
     def apply(*arguments: Any) -> Any:
         one = next((a for a in arguments if isinstance(a, Symbol)), None)
-        return plain(*arguments) if one is None else one.tape.write(FLOAT, name, *arguments)
+        return function_of(name, *arguments) if one is None else one.tape.write(FLOAT, name, *arguments)
 
     return apply
 
 
-sqrt, sin, cos, tan, exp, log, tanh = (
-    _function(name, getattr(math, name)) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")
-)
-arctan2, nearest, copysign = (
-    _function("arctan2", math.atan2),
-    _function("round", round),
-    _function("copysign", math.copysign),
-)
+sqrt, sin, cos, tan, exp, log, tanh = map(_function, ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh"))
+arctan2, nearest, copysign = map(_function, ("arctan2", "round", "copysign"))
 
 
 def select(condition: Any, a: Any, b: Any) -> Any:
@@ -71,7 +65,7 @@ def shared(kernel: Callable) -> Callable:
     def called(*arguments: Any) -> Any:
         symbol = next((one for one in leaves(arguments) if isinstance(one, Symbol)), None)
         if symbol is None:
-            return kernel(*arguments)
+            return plain(kernel)(*arguments)
         trace, tape = Trace(tape=symbol.tape), symbol.tape
         refuse, tape.decide = tape.decide, trace.decide
         try:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -48,10 +49,10 @@ class Dual:
     def __rsub__(self, other: Any) -> Dual:
         return Dual(other - self.value, -self.change)
 
-    def __mul__(self, other: Any) -> Dual:
+    def __mul__(self, other: Any) -> Any:
         if isinstance(other, Dual):
             return Dual(self.value * other.value, self.change * other.value + other.change * self.value)
-        return Dual(self.value * other, self.change * other)
+        return NotImplemented if isinstance(other, tuple) else Dual(self.value * other, self.change * other)
 
     __rmul__ = __mul__
 
@@ -102,6 +103,11 @@ class _Numbers:
         return np.power(*arguments) if operation == "pow" else getattr(np, operation)(*arguments)
 
 
+def function_of(name: str, *arguments: Any) -> Any:
+    """Return NumPy's function of this name of numbers."""
+    return _apply(name, getattr(np, name), *arguments)
+
+
 def _apply(name: str, function: Callable, *arguments: Any) -> Any:
     """Return a function of numbers, with changes where an argument has some."""
     if not any(isinstance(a, Dual) for a in arguments):
@@ -113,14 +119,12 @@ def _apply(name: str, function: Callable, *arguments: Any) -> Any:
     return Dual(result, change) if isinstance(change, np.ndarray) else result
 
 
-def _function(name: str) -> Callable:
-    return lambda *arguments: _apply(name, getattr(np, name), *arguments)
-
-
+@cache
 def plain(kernel: Any) -> Callable:
-    """Return the kernel as a function of Python on dual numbers."""
+    """Return the kernel as a function of Python on numbers, also with changes."""
     assert set(FUNCTIONS) <= RULES.keys()
-    function: Callable = Plain(_function, lambda a, b: b if b > a else a, lambda a, b: b if b < a else a)(kernel)
+    largest, smallest = lambda a, b: b if b > a else a, lambda a, b: b if b < a else a
+    function: Callable = Plain(lambda name: partial(function_of, name), largest, smallest)(kernel)
     return function
 
 

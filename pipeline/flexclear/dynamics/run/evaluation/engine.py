@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,7 +14,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
 from flexclear.dynamics.compile.files import interpreted
 from flexclear.dynamics.compile.functions import function, place
-from flexclear.dynamics.compile.sources import DESCRIBED, WHOLE
+from flexclear.dynamics.compile.sources import WHOLE
 from flexclear.dynamics.effects import scheme_of
 from flexclear.dynamics.equations.prescribed_motion import SHORTEST
 from flexclear.dynamics.integrate import METHODS
@@ -31,16 +32,17 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
     address,
     call_list,
+    described_in_python,
     equations,
-    has_routines,
     lists_in_python,
     made,
-    runner,
 )
 from flexclear.scene.loads import SampledPid
 from flexclear.system.errors import InputError, SolverError, refuse
 from flexclear.system.progress import Progress, silent
 
+#: how engines are made of models, if not with compiled functions (`without_compiler`)
+MAKER: ContextVar[Callable[[Model, Mobility], Engine] | None] = ContextVar("maker", default=None)
 #: of effects: why a run stopped, in words
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: selections of closure rows with specialised steps, per integration
@@ -153,15 +155,20 @@ class Engine:
             self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
         self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
         if not self.h[m.RATES]:
-            self.h[m.RATES], self.h[m.CALLS] = self._listed(rows, silent)
+            calls = call_list(self.model, self.h, known, rows)
+            self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
         self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
 
-    def _listed(self, rows: bytes, progress: Progress) -> tuple[int, int]:
-        """Return the address of the interpreter, and of the list of calls for selected rows; of kernels without."""
-        if not has_routines(self.model):
-            return int(self.h[m.EVALUATE]), 0
-        calls = call_list(self.model, self.h, self.specialised, rows, progress)
-        return calls.loaded.interpreter, calls.words.ctypes.data
+    def connect_record(self, progress: Progress) -> None:
+        """Connect the list of calls that evaluates what the record has, for the selected rows."""
+        if INTERPRETED:
+            if not self.h[m.DESCRIBE]:
+                describe = described_in_python(self.model, interpreted[int(self.h[m.PRESCRIBE])])
+                interpreted[id(describe)], self.h[m.DESCRIBE] = describe, id(describe)
+            return
+        given = self.model, self.h, self.specialised, self.selected.tobytes(), progress
+        calls = call_list(*given, m.RECORD_CALLS)
+        self.h[m.DESCRIBE], self.h[m.RECORD_CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
 
     @property
     def staged(self) -> bool:
@@ -183,7 +190,7 @@ class Engine:
                 specialised.rows.append(rows)
             for met in specialised.rows:
                 if not address(self.model, self.h, specialised, met, progress=progress):
-                    self._listed(met, progress)
+                    call_list(self.model, self.h, specialised, met, progress)
         self.connect()
 
     def _connect_lists(self, progress: Progress = silent) -> None:
@@ -196,16 +203,14 @@ class Engine:
             interpreted[id(run)] = run
             self.h[m.RUN], self.h[places] = id(run), 2 * m.PART * np.array(places, dtype=np.int64)
         elif not INTERPRETED:
-            self.h[m.RUN] = runner() if places else 0
             for where in places:
                 calls = call_list(self.model, self.h, self.specialised, rows, progress, where)
-                self.h[where] = calls.words.ctypes.data
+                self.h[m.RUN], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row, in this thread."""
         self._connect_lists()
-        if self.has_specialised_code:
-            self.h[m.DESCRIBE] = address(self.model, self.h, self.specialised, self.selected.tobytes(), DESCRIBED)
+        self.connect_record(silent)
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
         given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
         function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
@@ -305,14 +310,22 @@ def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[
 
 
 def prepare(model: Model, progress: Progress) -> Engine:
-    """Return the engine of a model, its kernels compiled or loaded. Raise SolverError for an impossible start."""
+    """Return the engine of a model, its kernels compiled or loaded unless `MAKER` makes another.
+
+    Raises SolverError for an impossible start.
+    """
     refuse(start_errors(model.mechanism, final=False))
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
     refuse_singular(model, mobility)
+    if make := MAKER.get():
+        return make(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
-    return assemble(model, entry, METHODS[solver.integrator], mobility)
+    engine = assemble(model, entry, METHODS[solver.integrator], mobility)
+    if not mobility.redundant:
+        engine.connect_record(progress)
+    return engine
 
 
 def assemble(

@@ -1,8 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
 It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
-steps run a list of calls of routines if these know all parts of the mechanism, else kernels; all other evaluations are
-those of kernels then. The topology alone decides, so that equal scenes give equal bytes.
+steps run a list of calls of routines, and all other evaluations are those of kernels. A list always evaluates what the
+record has. The topology alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
-from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.compile.sources import SPECIALISED, WHOLE
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
@@ -28,21 +28,10 @@ from flexclear.dynamics.specialise.topology import Topology, topology_of
 from flexclear.system.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from flexclear.dynamics.routines.calls import CallList
     from flexclear.dynamics.routines.store import ListInstance, LoadedList
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
-#: joints, surfaces, loads and effects that routines know (`mechanics`, which is imported only to compile)
-KNOWN = {
-    *("fixed", "revolute", "prismatic", "cylindrical", "slot", "planar", "universal", "spherical", "rotation-vector"),
-    *("free", "clearance-spherical", "clearance-revolute", "clearance-slot", "ball-on-plane", "joint-force"),
-    *("joint-spring", "joint-friction", "joint-expression", "pid", "sampled-pid", "spring-damper", "line-expression"),
-    *("bushing", "point-force", "point-torque", "point-expression", "stiffening", "stops", "gears", "bushings"),
-    *("controllers", "joint_friction", "wear"),
-}
-#: bearings with friction whose loads one routine finds: its code grows with their number cubed (16: 3 s of LLVM)
-MOST_BEARINGS = 16
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
 
@@ -70,16 +59,15 @@ class SpecialisedCode:
 
 
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
-    """Return the sources of a model's evaluation and description, by name, with all closure rows: the longest code.
+    """Return the sources of a model's evaluation, by name, with all closure rows: the longest code.
 
     Steps that solve for all rows are specialised as well; for redundant rows that is decided later.
     """
     if INTERPRETED:
         return sources.kernels(model.parts)
     topology = topology_of(model.arrays, model.arrays.h)
-    names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)
-    served = has_routines(model)
-    return {name: sources.specialised(model.parts, topology, name, routines=served) for name in names}
+    names = (WHOLE,) if mobility.redundant else (WHOLE, SPECIALISED)
+    return {name: sources.specialised(model.parts, topology, name) for name in names}
 
 
 def address(
@@ -97,45 +85,25 @@ def address(
     return known[rows, name]
 
 
-def has_routines(model: Model) -> bool:
-    """Return True when routines know all parts of a mechanism, few bearings rub, and no load looks up a table."""
-    parts = model.parts
-    loads, effects = (kind.partition(" ")[0] for kind in parts.loads), (one.name for one in parts.present)
-    known = KNOWN.issuperset([*parts.joints, *parts.surfaces, *loads, *effects])
-    known &= not any(" T" in kind for kind in parts.loads)  # tables of `scene.formulas`
-    return known and model.arrays.size(m.SIZES["n_bearings"]) <= MOST_BEARINGS
-
-
 def call_list(
     model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent, where: int = m.CALLS
 ) -> ListInstance:
-    """Return the list of calls that evaluates a mechanism of known routines (`mechanics`) with closure rows.
+    """Return the list of calls that evaluates a mechanism with closure rows (`mechanics`).
 
-    where: the place in h of its address, for another list (`mechanics.responses`).
+    where: the place in h of its address, of which another list has another one (`mechanics.of_topology`).
     """
-    from flexclear.dynamics.routines.store import stored  # here: it imports the compiler
-
-    def build() -> CallList:
-        from flexclear.dynamics.mechanics.of_topology import list_of
-
-        return list_of(model.parts, topology, where)
+    from flexclear.dynamics.mechanics.of_topology import list_of  # here: they import the compiler
+    from flexclear.dynamics.routines.store import stored
 
     of = rows, where
     if of not in code.running:
         if of not in code.lists:
-            topology = topology_of(model.arrays, selected(model, h, rows))
+            given = model.parts, topology_of(model.arrays, selected(model, h, rows)), where
             with _making:
-                key = repr((where, model.parts, topology)).encode()
-                code.lists[of] = stored(key, build, partial(progress, None))
+                key, place = repr(given).encode(), where if where in (m.CALLS, m.RECORD_CALLS) else None
+                code.lists[of] = stored(key, lambda: list_of(*given), partial(progress, None), place)
         code.running[of] = code.lists[of].instance(h)
     return code.running[of]
-
-
-def runner() -> int:
-    """Return the address of the function that runs lists besides the steps'."""
-    from flexclear.dynamics.routines import store
-
-    return store.runner()
 
 
 def lists_in_python(model: Model) -> Callable:
@@ -162,6 +130,20 @@ def lists_in_python(model: Model) -> Callable:
     return run
 
 
+def described_in_python(model: Model, laws: Callable) -> Callable:
+    """Return a function that Python evaluates in place of the list of the record; laws: evaluates the laws of time."""
+    from flexclear.dynamics.mechanics.of_topology import list_of
+    from flexclear.dynamics.routines.numbers import Numbers
+
+    def describe(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, y: int, dy: int) -> None:
+        laws(h, f, w, n, t)
+        calls = Numbers(h, f, w, n, int(y), int(dy))
+        list_of(model.parts, topology_of(model.arrays, h), m.RECORD_CALLS, calls)
+        n[m.EVALUATION], n[m.ABRIDGED], n[m.STATE] = calls.report, 1, y
+
+    return describe
+
+
 def selected(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
     """Return a copy of h with the selection of closure rows."""
     h = h.copy()
@@ -180,19 +162,19 @@ def made(
     exact: bool = False,
 ) -> int:
     """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
-    parts, of_steps, served = model.parts, name == SPECIALISED, has_routines(model)
+    parts, of_steps = model.parts, name == SPECIALISED
     changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
     with _making:  # engines may run concurrently
         topology = topology_of(model.arrays, selected(model, h, rows))
         key = (parts, topology, name, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
-                source = sources.batched(parts, topology, lanes, routines=served)
+                source = sources.batched(parts, topology, lanes)
             else:
                 source = (
-                    sources.tangent(parts, topology, routines=served)
+                    sources.tangent(parts, topology)
                     if changes
-                    else sources.specialised(parts, topology, name, exact=exact, routines=served)
+                    else sources.specialised(parts, topology, name, exact=exact)
                 )
             try:
                 _known[key] = functions.specialised(name, source, partial(progress, None))

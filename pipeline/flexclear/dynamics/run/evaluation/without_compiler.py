@@ -5,6 +5,8 @@ An evaluation takes milliseconds, a thousand times as long as compiled code: eno
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -16,8 +18,8 @@ from flexclear.dynamics.compile import functions, sources
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.run.evaluation.engine import Engine, assemble
-from flexclear.dynamics.run.evaluation.specialised_code import lists_in_python
+from flexclear.dynamics.run.evaluation.engine import MAKER, Engine, assemble
+from flexclear.dynamics.run.evaluation.specialised_code import described_in_python, lists_in_python
 
 
 @dataclass(frozen=True)
@@ -58,9 +60,20 @@ def uncompiled(model: Model, mobility: Mobility) -> Engine:
     return assemble(model, Uncompiled({}, _kernels(model)), method, mobility, PythonEngine)
 
 
+@contextmanager
+def without_compiler() -> Iterator[None]:
+    """Let all engines that are prepared during the context be evaluated in Python."""
+    token = MAKER.set(uncompiled)
+    try:
+        yield
+    finally:
+        MAKER.reset(token)
+
+
 def _kernels(model: Model) -> SimpleNamespace:
+    calls = SimpleNamespace(describe=described_in_python(model, lambda *given: calls.laws(*given)))
     run = lists_in_python(model)
-    calls = SimpleNamespace(correct=lambda *given: run(*given, 2 * m.PART * m.CORRECT))
+    calls.correct = lambda *given: run(*given, 2 * m.PART * m.CORRECT)
     calls.rates = lambda d, *given: calls.evaluate(d.h, d.f, d.w, d.n, *given)
     for name, kernel, source in sources.for_python(model.parts):
         scope: dict[str, Any] = {"calls": calls}
