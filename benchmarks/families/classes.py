@@ -238,7 +238,7 @@ CASES: dict[str, HardCase] = {
     "ball that starts in its plane": HardCase(
         "refusal", lambda: _ledger(lambda: scenes.bounce(-0.05)), refused="starts with a penetration of"
     ),
-    **{name: HardCase(FREQUENCIES, partial(_worst, *at), limit) for name, (*at, limit) in TURNING.items()},
+    **{name: HardCase(FREQUENCIES, partial(_worst, *given[:-1]), given[-1]) for name, given in TURNING.items()},
     "rectangular shaft between its critical speeds": HardCase(
         "growth rates, second solution", partial(_worst, "4-clamped-free", 4, "growth_error"), 1e-3
     ),

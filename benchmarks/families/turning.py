@@ -225,7 +225,7 @@ def two_discs(body: Body, kxx: float, kyy: float, kxy: float = 0.0) -> Scene:
     scene["body"]["ground"]["frames"] |= {name: scene["body"]["hub"]["frames"][name] for name in "AB"}
     K = np.zeros((6, 6))
     K[:2, :2] = [[kxx, kxy], [kxy, kyy]]
-    bushings = {name: ([f"ground.{name}", f"rod.{name}"], K.tolist()) for name in "AB"}
+    bushings: dict[str, Any] = {name: ([f"ground.{name}", f"rod.{name}"], K.tolist()) for name in "AB"}
     bushings["coupling"] = (["hub.A", "rod.A"], [0, 0, 1e9, 0, 0, 1e6])
     scene["load"] = {n: {"type": "bushing", "between": b, "stiffness": k} for n, (b, k) in bushings.items()}
     return Scene.model_validate(scene)

@@ -108,8 +108,10 @@ def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], 
     chosen = [Quantity.read(data) for data in params["quantities"]]
 
     def pair(name: str, members: int) -> ranked.Pair:
-        both = ((), params["removed"][name])
-        return ranked.Pair(*(_point(params, inputs, frozenset(gone), chosen, members) for gone in both), members)
+        with_it, without = (
+            _point(params, inputs, frozenset(gone), chosen, members) for gone in ((), params["removed"][name])
+        )
+        return ranked.Pair(with_it, without, members)
 
     results = ranked.assemble(
         {name: pair(name, members) for name, members in params["pairs"].items()},

@@ -136,8 +136,8 @@ def line_expression(given: Given, formula: str) -> Load:
 
 def mount(given: Given) -> Load:
     """Return the wrench of a bushing."""
-    *load, stored = bushing(given.numbers, given.states, given.F, given.G)
-    return Load(*load, stored=stored)
+    wrench, power, lost, states, stored = bushing(given.numbers, given.states, given.F, given.G)
+    return Load(wrench, power, lost, states, stored=stored)
 
 
 # On one point ---------------------------------------------------------------------------------------------------------
