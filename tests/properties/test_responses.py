@@ -15,7 +15,7 @@ from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
-from flexclear.dynamics.routines.store import load, runner
+from flexclear.dynamics.routines.store import load
 from flexclear.dynamics.run.evaluation.specialised_code import lists_in_python
 from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.schema import Scene
@@ -144,11 +144,11 @@ def test_springs_accelerate_as_dense_algebra_says(name: str) -> None:
 def test_compiled_lists_do_what_python_does(where: int) -> None:
     found = found_of("driven loop")
     model, run, (w, n) = found.model, Listed(found), (found.w.copy(), found.space.n.copy())
-    calls = load(list_of(model.parts, topology_of(model.arrays, found.h), where), silent_text).instance(found.h)
+    calls = load(list_of(model.parts, topology_of(model.arrays, found.h), where), silent_text, None).instance(found.h)
     for part in range(len(LISTS[where])):
         run.rates[:] = w[run.dy : run.dy + model.ny] = np.linspace(0.01, 0.02, model.ny)
         run(where, part)
         given: Any = (array.ctypes.data for array in (found.h, model.arrays.f, w, n))
-        _RUN(runner())(*given, 0.1, run.y, run.dy, calls.words[part].ctypes.data)
+        _RUN(calls.loaded.interpreter)(*given, 0.1, run.y, run.dy, calls.words[part].ctypes.data)
     for begin in (run.y, run.dy):
         assert apart(w[begin : begin + model.ny], run.w[begin : begin + model.ny]) < ROUNDING
