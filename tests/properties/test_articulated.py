@@ -9,7 +9,10 @@ import pytest
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics.of_topology import list_of, program_of
+from flexclear.dynamics.mechanics.evaluation import placed
+from flexclear.dynamics.mechanics.of_topology import mechanism_of, program_of
+from flexclear.dynamics.mechanics.record import store_energies
+from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.routines.numbers import Numbers
@@ -95,12 +98,15 @@ def bent(name: str) -> Evaluated:
 def kinetic_energy(found: Evaluated) -> Callable[[np.ndarray], Any]:
     """Kinetic energy of the speeds of all coordinates in the evaluated pose, in extended precision."""
     model, h, w, f = found.model, found.h, found.w.astype(np.longdouble), found.model.arrays.f.astype(np.longdouble)
-    topology, y, drives = topology_of(model.arrays, h), int(h[m.Y]), model.arrays.size(m.N_DRIVES)
+    y, drives, tables = int(h[m.Y]), model.arrays.size(m.N_DRIVES), Tables(model.parts, topology_of(model.arrays, h))
     rates = int(h[m.LAW.at]) + m.LAW.rate + m.LAW.size * np.arange(drives)
 
     def energy(speeds: np.ndarray) -> Any:
         w[y : y + model.ny][model.speeds], w[rates] = speeds[: model.nv], speeds[model.nv :]
-        list_of(model.parts, topology, m.RECORD_CALLS, Numbers(h, f, w, found.space.n, y, int(h[m.SLOPES])))
+        mechanism = mechanism_of(tables)
+        with Numbers(h, f, w, found.space.n, y, int(h[m.SLOPES])).building() as calls:
+            placed(mechanism)
+            store_energies(tables, mechanism, calls)
         return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 
     return energy

@@ -21,7 +21,7 @@ from flexclear.dynamics.routines.calls import CallList, Cell
 def describe(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallList) -> None:
     """Append the calls that store what a record has of an evaluated mechanism; wrenches about the world's origin."""
     with calls.building():
-        for store in (_coordinates, _frames, _energies):
+        for store in (_coordinates, _frames, store_energies):
             store(tables, mechanism, calls)
         for of_loops in (_wrenches, _jacobian):
             of_loops(tables, mechanism, loops, calls)
@@ -95,7 +95,7 @@ def _jacobian(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallLis
             calls.write(places, values)
 
 
-def _energies(tables: Tables, mechanism: Mechanism, calls: CallList) -> None:
+def store_energies(tables: Tables, mechanism: Mechanism, calls: CallList) -> None:
     """Store the energies of each independent mechanism: kinetic, of gravity, and stored in bodies and loads."""
     component, sites = tables.table(m.LINKS)["component"].tolist(), tables.table(m.SITES)["link"].tolist()
     sums, gravity = defaultdict[int, list[Any]](lambda: [0.0] * 3), Vector(mechanism.gravity)
