@@ -68,7 +68,8 @@ def keep_scales(d):
 def make_projection(rates: Callable, correct: Callable) -> Callable:
     """Build the kernel project(h, f, w, n, t, y, dy, tolerance).
 
-    rates: the right-hand side as steps evaluate it.  correct: stores changes that close the loops (`mechanics.responses`).
+    rates: the right-hand side as steps evaluate it.  correct: stores changes that close the loops, as
+    `mechanics.responses` has them.
     """
 
     @kernel
@@ -76,8 +77,8 @@ def make_projection(rates: Callable, correct: Callable) -> Callable:
         """Correct y until residuals [m] and their rates [m/s] of the selected rows are below `tolerance`.
 
         It needs the residuals of rates(d, t, y, dy), and leaves the work array, and dy, up to date.  It returns the
-        number of evaluations, or -1 when the loops do not close.  Very near a singular pose, where a residual says little
-        about the error of the state, nothing changes.
+        number of evaluations, or -1 when the loops do not close.  Very near a singular pose, where a residual says
+        little about the error of the state, nothing changes.
         """
         d = data(h, f, w, n)
         # redundant rows may have residuals of this fraction of the mechanism's size: rows of joints whose axes miss
