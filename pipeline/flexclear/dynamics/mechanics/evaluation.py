@@ -328,7 +328,7 @@ def passed_inwards(
     """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them; on_shapes: forces
     on the shapes of links, per row."""
     found, loads = Spread({}, {}), {link: list[tuple[c.Wrenches, Columns]]() for link in on_shapes}
-    waiting = dict.fromkeys(on_shapes, [Wrench(ZERO, ZERO)] * len(gamma))
+    waiting: dict[Link, c.Wrenches] = dict.fromkeys(on_shapes, [Wrench(ZERO, ZERO)] * len(gamma))
     S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
 
     def receive(frame: Frame, wrenches: c.Wrenches) -> None:
