@@ -68,8 +68,8 @@ def keep_scales(d):
 def make_projection(rates: Callable, correct: Callable) -> Callable:
     """Build the kernel project(h, f, w, n, t, y, dy, tolerance).
 
-    rates: the right-hand side as steps evaluate it.  correct: stores changes that close the loops
-    (`mechanics.responses`).
+    rates: the right-hand side as steps evaluate it.  correct: stores changes that close the loops, as
+    `mechanics.responses` has them.
     """
 
     @kernel
