@@ -91,10 +91,7 @@ def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
     for link in reversed(mechanism.links):
         carried_on = int(link.on_link)
         if modes := link.modes:
-            more: Any = [0.0] * len(modes.q)
-            for station in modes.stations:
-                more = f.bend(more, station, modes.q)
-            need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
+            need = needed(link, modes)
             if slowness:
                 need = need._replace(m=f.stiffened(need.m, modes.stiffness, slowness))
             modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
@@ -114,6 +111,14 @@ def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
 
 #: frames and wrenches on them, one for each row
 Ends = Sequence[tuple[Frame, c.Wrenches]]
+
+
+def needed(link: Link, modes: Modes) -> f.Need:
+    """Return what a flexible body needs alone."""
+    more: Any = [0.0] * len(modes.q)
+    for station in modes.stations:
+        more = f.bend(more, station, modes.q)
+    return f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
 
 
 class Spread(NamedTuple):

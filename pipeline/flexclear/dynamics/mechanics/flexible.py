@@ -41,6 +41,7 @@ from flexclear.dynamics.mechanics.trees import (
 )
 from flexclear.dynamics.mechanics.vectors import (
     AT_REST,
+    WITHOUT,
     ZERO,
     Inertia,
     Matrix,
@@ -311,6 +312,17 @@ def bend(forces: Numbers, station: Station, q: Numbers) -> list[Any]:
 def stiffened(mass: Rows, stiffness: Rows, share: float) -> list[Any]:
     """Return the mass of shapes with a share [s^2] of their stiffness, rows up to the diagonal."""
     return [[a + share * b for a, b in zip(*rows, strict=True)] for rows in zip(mass, stiffness, strict=True)]
+
+
+@routine
+def held(body: Need, beyond: Sequence[Beyond]) -> tuple[list[Any], Resistance]:
+    """Return the forces on the shapes of a body that hold them, and what its joint must resist then: a wrench."""
+    F, forces = body.F, list(body.forces)
+    for (_, wrench), columns in beyond:
+        F = F + wrench
+        for i, column in enumerate(columns):
+            forces[i] = forces[i] + wrench.on(column)
+    return forces, Resistance(WITHOUT, F)
 
 
 @routine
