@@ -337,10 +337,10 @@ def plan(
 
     The dataset (`post.answers.plan.dataset`) holds the estimated effect size of each effect on each quantity
     of `[accuracy]`, the decisions and their reasons.  accuracy: of all watched quantities, as a fraction of their
-    sizes; default: the scene's `[accuracy]`, else "1 %".  budget: time in which members of the full and the planned
-    scene are compared [s], or text such as "1min"; the dataset then has the plan's true `error` where it is decided,
-    its `chance`, the `allowed` error, the `horizon` as a fraction of the run and the `scatter` of single runs. In a
-    notebook the dataset shows the answer first.  Raises FlexclearError.
+    sizes; default: the scene's `[accuracy]`, else "1 %".  budget: processor time in which members of the full
+    and the planned scene are compared [s], or text such as "1min"; the dataset then has the plan's true `error` where
+    it is decided, its `chance`, the `allowed` error, the `horizon` as a fraction of the run and the `scatter` of
+    single runs. In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     return planning.dataset(_loaded(scene), accuracy, budget)
 

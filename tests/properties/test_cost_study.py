@@ -163,21 +163,6 @@ def test_what_cannot_be_had_is_explained(made: dict[str, Any], words: str):
     assert any(words in note for note in answer.price_list(study(**made)[0], "t").notes)
 
 
-@pytest.mark.parametrize(
-    "error, own, words",
-    [
-        (2e-15, {"own_rtol": 1e-10}, "time integration (2.0e-15 of a quantity's size), which is rounding."),
-        (1e-6, {"own_rtol": 1e-10}, "; remedy: a tighter tolerance."),
-        (1e-6, {"own_step": 1e-4}, "; remedy: shorter steps."),
-    ],
-)
-def test_the_remedy_of_a_cause_fits_the_scene_and_rounding_has_none(error: float, own: dict[str, float], words: str):
-    names = ["time integration", "event location"]
-    errors = {"error_by_cause": (("quantity", "cause"), [[error, np.nan]])}
-    found = xr.Dataset(errors, {"quantity": ["bar.position"], "cause": names}, {"flexible": 0, **own})
-    assert answer._cause(found).endswith(words)
-
-
 def test_a_scene_that_is_refused_as_it_is_has_no_causes():
     _, points, runs = study()
     points.append(Point("as it is", "sampling", {"interval": 0.1}))

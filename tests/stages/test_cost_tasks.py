@@ -122,7 +122,6 @@ def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Stud
     text = sentences(found)
     assert "dop853 at rtol 1e-06" in text
     assert "The integration errs at the outputs" in text
-    assert "of a quantity's size" in text
     assert "One more digit costs" in text
     assert found.attrs["own_evaluations"] > 0
     assert found.attrs["complete"] == 0  # the neighbourhood is not all

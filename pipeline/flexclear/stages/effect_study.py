@@ -108,10 +108,9 @@ def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], 
     chosen = [Quantity.read(data) for data in params["quantities"]]
 
     def pair(name: str, members: int) -> ranked.Pair:
-        with_it, without = (
-            _point(params, inputs, frozenset(gone), chosen, members) for gone in ((), params["removed"][name])
-        )
-        return ranked.Pair(with_it, without, members)
+        gone = frozenset(params["removed"][name])
+        full, without = (_point(params, inputs, names, chosen, members) for names in (frozenset[str](), gone))
+        return ranked.Pair(full, without, members)
 
     results = ranked.assemble(
         {name: pair(name, members) for name, members in params["pairs"].items()},

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     from flexclear.scene.schema import Scene
 
-#: fraction of the budget that the costs of accuracy may take
-ACCURACY = 0.125
+#: fractions of the budget that the costs of accuracy may take: next to effects, and of the default one without effects
+ACCURACY, ALONE = 0.125, 0.5
 #: default budget: so many times the processor time of the scene's own run, and at least so long [s]
 TIMES, LEAST = 6.0, 60.0
 
@@ -122,7 +122,8 @@ class Answers:
     @cached_property
     def _study(self) -> cost.Study:
         """Return the study with the points in the neighbourhood of the scene's own setting."""
-        study, part = self._started, ACCURACY if self.questions > 1 else 1.0
+        study, part = self._started, ALONE if self.seconds is None else 1.0
+        part = ACCURACY if self.questions > 1 else part
         study.first(part)
         study.neighbourhood(part)
         return study

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 #: least number of repeats of an integration; short ones are repeated until they have taken this time [s] together, at
 #: most that often: a disturbance of a millisecond is a tenth of some. A run of LONG_RUN [s] is not repeated
-REPEATS, ENOUGH_TIME, MOST_REPEATS, LONG_RUN = 3, 0.05, 15, 0.5
+REPEATS, ENOUGH_TIME, MOST_REPEATS, LONG_RUN = 3, 0.05, 15, 0.2
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,14 @@ from flexclear.artifacts.effect_size import (
     size,
 )
 from flexclear.artifacts.points import Point
-from flexclear.post.answers.effect_sizes import MEANING_NOT_COMPARABLE, NOT_COMPARABLE, cell, listed, written
+from flexclear.post.answers.effect_sizes import (
+    MEANING_NOT_COMPARABLE,
+    NOT_COMPARABLE,
+    cell,
+    listed,
+    with_early_changes,
+    written,
+)
 from flexclear.post.overview.curves import format_to_digits, in_unit, size_of
 from flexclear.post.plotting.table import Table
 from flexclear.scene.quantity import Quantity
@@ -91,7 +98,6 @@ def assemble(
     names = list(pairs)
     changes = [[compared(pairs[name], q) for q in chosen] for name in names]
     begun = [early_changes(p.without, p.full, chosen, p.members, times, error) for p in pairs.values()]
-    horizons, early = [horizon for horizon, _ in begun], [row for _, row in begun]
     full = next(iter(pairs.values())).full
     scales = [size(full, q) if not full.refused else np.nan for q in chosen]
     differences = np.array([[c.difference for c in row] for row in changes])
@@ -100,9 +106,6 @@ def assemble(
     data = {
         "dropped": (dims, differences, {"long_name": "change without the effect"}),
         "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be due to chance"}),
-        "early": (dims, np.array([[c.difference for c in row] for row in early])),
-        "early_uncertainty": (dims, np.array([[c.uncertainty for c in row] for row in early])),
-        "horizon": (("effect",), np.array(horizons)),
         "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
         "scatter": (
@@ -118,17 +121,10 @@ def assemble(
         "quantity": [q.name for q in chosen],
         "unit": ("quantity", list(units)),
     }
-    described = {
-        "early": "change without the effect up to the horizon",
-        "early_uncertainty": "part of that change that may be due to errors of the time integration",
-        "horizon": "time up to which the members of both variants are one motion each; nan: they always are",
-    }
     refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
     text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why and words[name])
     result = xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
-    for name, meaning in described.items():
-        result[name].attrs = {"long_name": meaning} | ({"units": "s"} if name == "horizon" else {})
-    return result
+    return with_early_changes(result, begun)
 
 
 def ideal_sentences(result: xr.Dataset) -> list[str]:

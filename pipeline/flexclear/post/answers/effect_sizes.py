@@ -75,7 +75,7 @@ def assemble(
     """
     every, n = frozenset(effect.name for effect in effects), len(effects)
     shape = (n, n, len(chosen))
-    early, horizon = np.full((2, n, len(chosen)), np.nan), np.full(n, np.nan)
+    begun = list[tuple[float, list[Influence]]]()
     data = {f"{name}{part}": np.full(shape, np.nan) for name in MEANINGS for part in ("", "_uncertainty")}
     full = points[frozenset()]
     for i, one in enumerate(effects):
@@ -88,8 +88,7 @@ def assemble(
             single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
             independent = i != j and one.within != other.name and other.within != one.name
             if i == j:
-                horizon[i], changes = early_changes(lost, full, chosen, members, times, error)
-                early[:, i] = np.array([(c.difference, c.uncertainty) for c in changes]).T
+                begun.append(early_changes(lost, full, chosen, members, times, error))
             for k, quantity in enumerate(chosen):
                 variables = {"dropped": change(lost, full, quantity, members)}
                 variables["added"] = change(gained, bare, quantity, members)
@@ -109,19 +108,29 @@ def assemble(
         },
         attrs={"Conventions": "CF-1.11", "members": members},
     )
-    result["early"] = (("effect", "quantity"), early[0], {"long_name": f"{MEANINGS['dropped']}, up to the horizon"})
-    described = "part of that change that may be due to errors of the time integration"
-    result["early_uncertainty"] = (("effect", "quantity"), early[1], {"long_name": described})
-    result["horizon"] = (
-        ("effect",),
-        horizon,
-        {"units": "s", "long_name": "time up to which members of a variant are one motion"},
-    )
     for name, text in MEANINGS.items():
         result[name].attrs = {"long_name": text}
         result[f"{name}_uncertainty"].attrs = {"long_name": f"{text}: part that may be due to chance"}
     refused = {"+".join(sorted(gone)) or "full": p.refused for gone, p in points.items() if p.refused}
-    return result.assign_attrs(refused="\n".join(f"without {gone}: {why}" for gone, why in refused.items()))
+    why = "\n".join(f"without {gone}: {why}" for gone, why in refused.items())
+    return with_early_changes(result, begun).assign_attrs(refused=why)
+
+
+def with_early_changes(result: xr.Dataset, begun: Sequence[tuple[float, Sequence[Influence]]]) -> xr.Dataset:
+    """Return the dataset of effects with their horizons [s] and their changes of each quantity up to these.
+
+    begun: results of `effect_size.early_changes`, by effect.
+    """
+    rows = [[(c.difference, c.uncertainty) for c in changes] for _, changes in begun]
+    early = np.array(rows).reshape(len(begun), result.sizes["quantity"], 2)
+    dims, change = ("effect", "quantity"), f"{MEANINGS['dropped']}, up to the horizon"
+    doubt = "part of that change that may be due to errors of the time integration"
+    words = "time up to which the members of both variants are one motion each; nan: they always are"
+    return result.assign(
+        early=(dims, early[:, :, 0], {"long_name": change}),
+        early_uncertainty=(dims, early[:, :, 1], {"long_name": doubt}),
+        horizon=(("effect",), [horizon for horizon, _ in begun], {"units": "s", "long_name": words}),
+    )
 
 
 def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:

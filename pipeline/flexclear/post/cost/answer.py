@@ -8,18 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.post.cost.causes import CAUSES, OTHER
 from flexclear.post.cost.study import methods, recording, resolved
 from flexclear.post.overview.curves import size_of
 from flexclear.post.plotting.table import Table
 
-#: a setting as accurate as the scene's own is named where it costs less than this fraction
-CHEAPER = 0.7
-
 
 def sentences(study: xr.Dataset) -> str:
     """Return the answer in words; study: of `stages.cost_study`."""
-    return " ".join(filter(None, (_own(study), _digit(study), _looser(study), _cause(study), *undone(study))))
+    return " ".join(filter(None, (_own(study), _digit(study), *undone(study))))
 
 
 def _worst(study: xr.Dataset) -> tuple[str, float]:
@@ -53,39 +49,6 @@ def _digit(study: xr.Dataset) -> str:
     if better is None:
         return "One more digit was not reached within the budget." if np.isfinite(error) else ""
     return f"One more digit costs {better.seconds / study.attrs['own_seconds']:.2g} times as much ({better.name})."
-
-
-def _looser(study: xr.Dataset) -> str:
-    """Return a sentence on a setting that is as accurate for less, or nothing."""
-    _, error = _worst(study)
-    same = cheapest(study, error) if np.isfinite(error) else None
-    if same is None or same.seconds > CHEAPER * study.attrs["own_seconds"]:
-        return ""
-    return f"{same.name} is as accurate for {same.seconds / study.attrs['own_seconds']:.2g} times the cost."
-
-
-def _cause(study: xr.Dataset) -> str:
-    """Return a sentence on the largest known cause of error, by the largest error of any quantity."""
-    if "error_by_cause" not in study:
-        return ""
-    largest = study["error_by_cause"].max("quantity")
-    known = {str(c): float(v) for c, v in zip(study["cause"].values, largest.values, strict=True) if not np.isnan(v)}
-    if not known:
-        return ""
-    first = max(known, key=lambda cause: known[cause])
-    others = ", ".join(f"{cause} {value:.1e}" for cause, value in known.items() if cause != first and value > 0.0)
-    size = f"{known[first]:.1e} of a quantity's size" if np.isfinite(known[first]) else OTHER
-    rest = f"; {others}" if others else ""
-    missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
-    unseen = f" Not examined: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
-    helps = ", which the root finder bounds" if first == "event location" else f"; remedy: {_remedy(study, first)}"
-    helps = ", which is rounding" if known[first] < ROUNDING else helps
-    return f"Of all causes of error the largest is {first} ({size}{rest}){helps}.{unseen}"
-
-
-def _remedy(study: xr.Dataset, cause: str) -> str:
-    """Return what makes the error by a cause smaller, with the settings that the scene has."""
-    return "shorter steps" if cause == "time integration" and "own_step" in study.attrs else CAUSES[cause]
 
 
 def undone(study: xr.Dataset) -> list[str]:
@@ -135,8 +98,6 @@ def sections(scenes: tuple[Studied, ...]) -> str:
 
 
 TARGETS = (1e-3, 1e-6, 1e-9)
-#: errors below this fraction of a quantity's size are rounding
-ROUNDING = 1e-12
 #: a best error within this multiple of the reference's uncertainty, which it contains, is rounding
 ROUNDED = 3.0
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
