@@ -13,8 +13,10 @@ import pytest
 
 from flexclear.commands.__main__ import main
 from flexclear.scene.load import load_scene
+from flexclear.stages.cad_scene import _fits
 from flexclear.structure.fe.solid import geometry, step
 from flexclear.structure.fe.solid.recipe import StepFile
+from flexclear.structure.fe.solid.step import Round
 from flexclear.structure.kinds import kind
 from flexclear.structure.modes.bundle import rigid_of
 from flexclear.system.errors import InputError, ResourceError
@@ -219,3 +221,22 @@ def test_a_file_of_an_unknown_program_is_refused(tmp_path: Path, capsys: pytest.
     assert "unknown ending '.sldprt'" in capsys.readouterr().err
     assert main(["new", "five-bar"]) == 2
     assert "did you mean 'four-bar'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "radii, holes, fit",
+    [
+        *[((10.0, shaft), (True, False), shaft > 5.0) for shaft in (4.9, 5.1, 9.9, 10.0)],
+        ((10.0, 10.5), (True, False), False),
+        ((10.0, 8.1), (True, True), True),
+        ((10.0, 7.9), (True, True), False),
+    ],
+)
+def test_a_shaft_belongs_to_a_hole_that_is_at_most_twice_as_wide(
+    radii: tuple[float, float], holes: tuple[bool, bool], fit: bool
+) -> None:
+    """Two holes share a pin if they are alike to a fifth."""
+    rounds = [
+        Round(hole, np.zeros(3), np.array([0.0, 0.0, 1.0]), r, 20.0) for r, hole in zip(radii, holes, strict=True)
+    ]
+    assert _fits(*rounds) == _fits(*rounds[::-1]) == fit

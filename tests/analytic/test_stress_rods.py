@@ -9,14 +9,14 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from flexclear.dynamics.record.stress import Motion, peak_stresses, section_forces
+from flexclear.dynamics.record.stress import Motion, _turn, peak_stresses, section_forces
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import load_scene
 from flexclear.stages.graph import Graph
 from flexclear.structure.fe import section as sections
 from flexclear.structure.modes import bundle
 from flexclear.structure.modes.solution import solve
-from flexclear.structure.stress.beam import Outline, outline, recover
+from flexclear.structure.stress.beam import Outline, _axial, outline, recover
 from flexclear.system.errors import InputError
 from tests.analytic.beam_models import GENERAL, build
 from tests.analytic.beam_solutions import PAPER_ROD as ROD
@@ -83,6 +83,23 @@ def test_a_rectangle_peaks_at_its_corner() -> None:
 def test_torsion_of_a_round_section_is_T_r_over_J(name: str, given: sections.Section) -> None:
     _, mises = peaks(maps(name, given), [0.0, 0.0, 0.0, 4.0, 0.0, 0.0])
     assert mises == pytest.approx(np.sqrt(3.0) * 4.0 * R / given.torsion, rel=1e-13)
+
+
+def test_axial_stress_has_the_normal_force_and_the_bending_moments_as_its_resultants() -> None:
+    """N = int s dA, My = int z s dA, Mz = -int y s dA, each of a force alone; the others are none."""
+    middles = (np.arange(100) + 0.5) / 100 - 0.5
+    y, z = (values.ravel() for values in np.meshgrid(WIDTH * middles, HEIGHT * middles))
+    stress = _axial(BLOCK, y, z)[:, 0] * (WIDTH * HEIGHT / y.size)
+    known = np.zeros((3, 6))
+    known[0, N] = known[1, MY] = known[2, MZ] = 1.0
+    # sums over 100 by 100 squares: 1e-4 of the second moments
+    assert np.stack([np.ones(y.size), z, -y]) @ stress == pytest.approx(known, abs=1.01e-4)
+
+
+def test_sections_turn_by_their_rotation_vectors() -> None:
+    vectors = np.array([[[0.0, 0.0, 0.0], [0.3, -1.2, 0.4]], [[1e-9, 0.0, 2e-9], [2.0, 1.0, -0.5]]])
+    known = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(2, 2, 3, 3)
+    assert _turn(vectors) == pytest.approx(known, abs=1e-15)  # rounding
 
 
 def test_torsion_of_a_square_peaks_at_4_8_T_over_a_cubed() -> None:

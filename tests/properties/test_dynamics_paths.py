@@ -8,6 +8,7 @@ import xarray as xr
 
 from flexclear.dynamics.model.laws import drive_laws
 from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.run.inverse import hermite
 from flexclear.numerics.rotations import quaternion_to_matrix, rotation_vector_to_matrix
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
@@ -229,3 +230,13 @@ def test_a_path_and_a_joint_drive_do_not_fight_unnoticed() -> None:
     )
     with pytest.raises(InputError, match="closes a loop"):
         simulate(table)
+
+
+def test_recorded_motions_are_continued_by_the_quintics_through_their_rows() -> None:
+    """A polynomial of degree five is its own interpolation, rates and second rates included."""
+    known, rows = np.polynomial.Polynomial([0.3, -1.0, 2.0, 0.7, -1.5, 0.4]), np.array([0.2, 0.5, 1.3])
+    series = np.array([known.deriv(order)(rows) if order else known(rows) for order in range(3)])
+    found = hermite(rows, series, series)
+    for t in (0.2, 0.3, 0.49, 0.5, 0.9, 1.3):
+        values = [found.value(t, order) for order in range(3)]
+        assert values == pytest.approx([known.deriv(k)(t) if k else known(t) for k in range(3)], rel=1e-11)  # rounding

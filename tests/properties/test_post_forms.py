@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from flexclear.dynamics import analyses
-from flexclear.post.render import film_speed, forms, gl, joint_view, player, surfaces, vibrations
+from flexclear.post.render import film_speed, forms, gl, gltf, joint_view, player, surfaces, vibrations
 from flexclear.post.render.forms import Seat, equivalent, wheels
 from flexclear.post.render.mechanism import Looks, Mechanism, drawn_points, mechanism
 from flexclear.post.render.pictures import MAKERS, Shown, make
@@ -206,6 +206,20 @@ def test_a_gltf_file_is_whole_and_moves_every_body(shown: Shown):
     moved = {reported["nodes"][c["target"]["node"]]["name"] for c in animation["channels"]}
     assert moved == {str(name) for name in shown.run.body.values}
     assert sum(c["target"]["path"] == "weights" for c in animation["channels"]) == 1
+
+
+def test_each_mode_of_a_gltf_file_takes_a_second_and_moves_its_own_shape() -> None:
+    bundle = synthetic.bundle()
+    content = gltf.modes("rod", bundle, np.ones(bundle.sizes["mode"]))
+    size = struct.unpack("<I", content[12:16])[0]
+    reported = json.loads(content[20 : 20 + size])
+    assert len(reported["animations"]) == bundle.sizes["mode"]
+    for animation in reported["animations"]:
+        (sampler,) = animation["samplers"]
+        times, weights = (reported["accessors"][sampler[key]] for key in ("input", "output"))
+        assert (times["min"], times["max"]) == ([0.0], [1.0])
+        assert weights["max"] == [1.0]
+        assert weights["count"] == times["count"] * bundle.sizes["mode"]
 
 
 def test_a_series_for_paraview_names_files_that_are_there(shown: Shown):
