@@ -15,6 +15,7 @@ import pytest
 
 from flexclear.commands.__main__ import main
 from flexclear.scene.load import files_read
+from flexclear.stages import live as live_page
 from flexclear.system.errors import INTERRUPTED
 from tests.browser import Browser, browser, needs_browser
 
@@ -43,6 +44,9 @@ between = ["ground.O", "bob.hinge"]
 type = "gravity"
 acceleration = [0.0, -9.81, 0.0]
 """
+
+#: time [s] of a motion whose run takes minutes
+LONG = 1e7
 
 
 @dataclass
@@ -135,6 +139,16 @@ def test_followed_are_the_files_that_a_scene_extends_and_those_that_it_names(tmp
     assert files_read(first) == [first, second]
 
 
+def test_only_lines_of_toml_files_are_quoted(tmp_path: Path):
+    """A scene may extend any file that can be read as TOML, such as one with passwords."""
+    (secret := tmp_path / "secret.env").write_text("[body.rod]\nmass = 'a password'\n")
+    (named := tmp_path / "named.toml").symlink_to(secret)
+    (own := tmp_path / "own.toml").write_text(secret.read_text())
+    record = {"line": 2, "place": "x.toml [body.rod.mass]"}
+    quoted = live_page._quoted([{**record, "file": str(file)} for file in (secret, named, own)])
+    assert [one["text"] for one in quoted] == ["", "", "mass = 'a password'"]
+
+
 FOUND = "return document.querySelector('.findings').innerText"
 
 
@@ -169,3 +183,36 @@ def test_the_page_follows_the_file_with_all_errors_by_line(served: Live, window:
     errors, asked = window.logs()
     assert errors == []
     assert all(url.startswith(served.url) for url in asked)
+
+
+@needs_browser
+def test_film_and_curves_follow_the_file(tmp_path: Path, window: Browser):
+    """A run of a minute and more is stopped by the next save; a scene with errors leaves the film; its time stays."""
+    films = "[...document.querySelectorAll('.viewer')].map((v) => v.viewer).filter((v) => v.data.times.length > 1)"
+    curves = "return [...document.images].filter((i) => i.complete && i.naturalWidth > 100).length"
+    end = f"return {films}[0].data.times.at(-1)"
+    with live(tmp_path, "--run") as one:
+        window.size(1280, 900)
+        window.open(one.url)
+        window.wait(f"return {films}.length === 1", 120.0)
+        assert window.run(end) == pytest.approx(0.2)
+        assert window.wait(curves) == 1
+        one.write(PENDULUM.replace('"0.2 s"', f'"{LONG:g} s"\noutput.interval = "1000 s"'))
+        window.wait(FOUND.replace("return", "return /It runs/.test(") + ")")
+        one.write(PENDULUM.replace('"0.2 s"', '"0.1 s"'))
+        window.wait(f"return {films}[0].data.times.at(-1) < 0.15", 120.0)
+        assert not window.run(FOUND.replace("return", "return /It runs/.test(") + ")")
+        window.run(f"{films}[0].zoom(2); const t = document.querySelector('[data-part=time]'); t.value = 9;"
+                   "t.dispatchEvent(new Event('input'))")  # fmt: skip
+        one.write(PENDULUM.replace("1 kg", "1 s"))
+        window.wait(FOUND.replace("return", "return /1 error/.test(") + ")")
+        assert "Film and curves are those of the last version that ran." in window.run(FOUND)
+        assert window.run(f"return {films}[0].frame") == 9
+        assert window.logs()[0] == []
+        one.process.send_signal(signal.SIGINT)
+        assert one.process.wait(60) == INTERRUPTED
+
+
+def test_a_film_needs_the_page(capsys: pytest.CaptureFixture[str]):
+    assert main(["show", "--run", "sps4/csj"]) == 2
+    assert "hint: add --watch" in capsys.readouterr().err

@@ -9,6 +9,7 @@ from flexclear.scene import lines
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
 from flexclear.stages.show import shown
+from flexclear.stages.workplace import open_workplace
 from flexclear.system.errors import InputError
 
 
@@ -19,6 +20,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--watch",
         action="store_true",
         help="serve the page of one scene on this machine, with all errors of `check`, and draw again what is saved",
+    )
+    parser.add_argument(
+        "--run", action="store_true", help="with --watch: also run what is saved, for its film and watched curves"
     )
 
 
@@ -33,7 +37,10 @@ def command(options: argparse.Namespace) -> int:
         from flexclear.commands.check import examined
         from flexclear.stages import live
 
-        live.follow(options.scenes[0], options.set, examined)
+        workplace = open_workplace(options) if options.run else None
+        live.follow(options.scenes[0], options.set, examined, workplace)
+    if options.run:
+        raise InputError("--run", "shows a film on the page that follows a file", "add --watch")
     result, made = 0, dict[str, list[str]]()
     for name in options.scenes:
         scene = scenes.loaded(name, options.set)

@@ -11,10 +11,15 @@ from socketserver import TCPServer
 from threading import Thread
 from typing import Any, Protocol
 
-from flexclear.post.pages import findings, live_page
+from flexclear.post.pages import figures_of, findings, live_page, media
 from flexclear.scene.load import files_read
+from flexclear.scene.schema import Scene
 from flexclear.stages import scenes, show
+from flexclear.stages.graph import Graph
+from flexclear.stages.notebook import DRAWN
+from flexclear.stages.workplace import Workplace
 from flexclear.system.errors import FlexclearError, InputError
+from flexclear.workflow import stopping
 
 #: the only address that serves, and interval at which the files are looked at [s]
 ADDRESS, TICK = "127.0.0.1", 0.25
@@ -28,12 +33,15 @@ POLICY = (
 class Findings(Protocol):
     """What `commands.check.examined` returns."""
 
+    errors: list[FlexclearError]
     notes: list[str]
 
     def records(self) -> list[dict[str, Any]]:
         """Return errors and warnings as tables: severity, file, line, place, problem, remedy."""
 
 
+#: keys of a record without a place in a file
+EMPTY = ("file", "line", "remedy")
 #: examines a scene: its name, its settings, and the error that refuses its drawn start, or None
 Examine = Callable[[str, Sequence[str], InputError | None], Findings]
 
@@ -108,16 +116,17 @@ def served() -> Iterator[Server]:
             thread.join()
 
 
-def follow(name: str, settings: Sequence[str], examine: Examine) -> None:
+def follow(name: str, settings: Sequence[str], examine: Examine, workplace: Workplace | None = None) -> None:
     """Serve the start pose of a scene with all errors beside it, drawn again when one of its files is saved.
 
-    Ends by Ctrl-C only.  A pose that cannot be drawn leaves the last one.
+    Ends by Ctrl-C only.  A pose that cannot be drawn leaves the last one.  workplace: where a scene without error is
+    also run, for its film and watched curves; None: it is not run.
     """
-    path, title, views = scenes.find_scene(name), name, list[str]()
+    path, title, views, film = scenes.find_scene(name), name, list[str](), list[str]()
     with served() as server:
         print(f"http://{ADDRESS}:{server.server_port}/ follows {path} until Ctrl-C", flush=True)
         while True:
-            saved = _stamps(files := files_read(path))
+            saved = Saved(files_read(path))
             refused, note = None, []
             try:
                 scene = scenes.loaded(name, settings)
@@ -126,10 +135,47 @@ def follow(name: str, settings: Sequence[str], examine: Examine) -> None:
             except FlexclearError:  # among those that `examine` returns
                 note = ["The view is that of the last version that can be drawn." if views else "Nothing can be drawn."]
             found = examine(name, settings, refused)
-            records = found.records()
-            server.publish(title, views, findings(_count(records, path), _quoted(records), [*note, *found.notes]))
-            while _stamps(files) == saved:
+            records, notes = found.records(), [*note, *found.notes]
+            sound = workplace is not None and not found.errors
+            now = ["It runs."] if sound else ["Film and curves are those of the last version that ran."] if film else []
+            server.publish(title, [*views, *film], findings(_count(records, path), _quoted(records), [*notes, *now]))
+            if workplace is not None and sound:
+                try:
+                    with stopping.when(saved.again, "a file of the scene was saved"):
+                        film, now = _film(scene, workplace), []
+                except FlexclearError as error:
+                    now = ["The film is that of the last version that ran."] if film else []
+                    records.append({"severity": "error", "problem": str(error), "place": "", **dict.fromkeys(EMPTY)})
+                if not saved.again():
+                    beside = findings(_count(records, path), _quoted(records), [*notes, *now])
+                    server.publish(title, [*views, *film], beside)
+            while not saved.again():
                 time.sleep(TICK)
+
+
+def _film(scene: Scene, workplace: Workplace) -> list[str]:
+    """Run a scene, and return its motion as a view to turn, and its watched quantities."""
+    from flexclear.post.overview.figures import watched_curves
+
+    graph = Graph(scene, shown=False)
+    drawn, run = workplace.made(graph.picture("motion", "html"), graph.simulate, jobs=1)
+    curves = watched_curves(run.dataset(), scene.watched()[:DRAWN])
+    views = [figures_of(drawn.text(name)) for name in drawn.record.files]
+    return views if curves is None else [*views, media("watched.png", curves, "Watched quantities")]
+
+
+class Saved:
+    """Files, and whether one of them was saved, replaced or removed since this object was made."""
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self.files, self.stamps = files, _stamps(files)
+        self.asked, self.changed = time.monotonic(), False
+
+    def again(self) -> bool:
+        """Return True when one was; looks at the disk at most once in TICK."""
+        if not self.changed and time.monotonic() - self.asked >= TICK:
+            self.asked, self.changed = time.monotonic(), _stamps(self.files) != self.stamps
+        return self.changed
 
 
 def _stamps(files: Iterable[Path]) -> list[tuple[int, ...] | None]:
@@ -155,7 +201,8 @@ def _quoted(records: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
     for record in records:
         text, place = "", record["place"]
         if record["line"]:
-            place = place[place.find("[") :] if "[" in place else ""
+            place, file = place[place.find("[") :] if "[" in place else "", Path(record["file"]).resolve()
             with suppress(OSError, ValueError, IndexError):
-                text = Path(record["file"]).read_text(encoding="utf-8-sig").splitlines()[record["line"] - 1].strip()
+                if file.suffix == ".toml":  # no other file that a scene names is quoted
+                    text = file.read_text(encoding="utf-8-sig").splitlines()[record["line"] - 1].strip()
         yield {**record, "place": place, "text": text}

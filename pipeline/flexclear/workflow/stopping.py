@@ -10,7 +10,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _why = ""
 _heeded = 0
 _heeded_lock = threading.Lock()
 _busy = False
-_deadlines: list[tuple[float, str]] = []
+_conditions: list[tuple[Callable[[], bool], str]] = []
 
 
 def request(why: str) -> None:
@@ -36,8 +36,7 @@ def request(why: str) -> None:
 
 def requested() -> str:
     """Return the reason why the work must stop; empty while it may go on."""
-    now = time.monotonic()
-    return _why or next((why for end, why in _deadlines if now > end), "")
+    return _why or next((why for due, why in _conditions if due()), "")
 
 
 def check() -> None:
@@ -81,18 +80,23 @@ def busy() -> Iterator[None]:
         _busy = False
 
 
-@contextmanager
-def until(seconds: float | None, why: str) -> Iterator[None]:
+def until(seconds: float | None, why: str) -> AbstractContextManager[None]:
     """Request a stop inside this context after `seconds`; None sets no limit."""
     if seconds is None:
-        yield
-        return
-    entry = (time.monotonic() + seconds, why)
-    _deadlines.append(entry)
+        return nullcontext()
+    end = time.monotonic() + seconds
+    return when(lambda: time.monotonic() > end, why)
+
+
+@contextmanager
+def when(due: Callable[[], bool], why: str) -> Iterator[None]:
+    """Request a stop inside this context once `due` returns True, which is asked often."""
+    entry = (due, why)
+    _conditions.append(entry)
     try:
         yield
     finally:
-        _deadlines.remove(entry)
+        _conditions.remove(entry)
 
 
 @contextmanager
