@@ -290,7 +290,7 @@ def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
     """Steps know neither joints nor bodies nor laws; what is recorded and the equations know no integrator."""
     one, whole = CASES["clearance"][0], CASES["everything"][0]
     mine, theirs = digests(one, SCHEME), digests(whole, SCHEME)
-    assert [name for name in mine if mine[name] == theirs[name]] == ["resolve", "observe", "advance"]
+    assert [name for name in mine if mine[name] == theirs[name]] == ["project", "resolve", "observe", "advance"]
     # they end on guards, whatever these watch: sliding in joints or along coordinates
     hinges, springs = CASES["rubbing hinges"][0], replace(CASES["springs"][0], closures=True, load_kinks=True)
     assert digests(hinges, SCHEME)["advance"] == digests(springs, SCHEME)["advance"] != mine["advance"]
