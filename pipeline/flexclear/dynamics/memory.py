@@ -154,23 +154,20 @@ class Room:
 # fmt: off
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
-    N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
-    MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS,
-    N_LOAD_NUMBERS, N_CHANGES, F_CHANGE, W_CHANGE,
+    N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE, MOST_MODES, N_LAWS, N_LOADS,
+    N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS, N_LOAD_NUMBERS, N_CHANGES,
+    F_CHANGE, W_CHANGE,
 ) = _sizes("n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger "
-    "n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
-    "n_loads n_internal n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_load_numbers n_changes "
-    "f_change w_change",
+    "n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws n_loads n_internal "
+    "n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_load_numbers n_changes f_change w_change",
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`). RATES: the function that steps
-#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`);
-#: DESCRIBE, RECORD_CALLS: the function that stores what the record has as well, and its list; RUN: the function that
-#: runs other lists: CORRECT, DISPLACE, and SPRINGS in two parts (`mechanics.responses`)
-EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RECORD_CALLS = _indices(8)
-RUN, CORRECT, DISPLACE, SPRINGS = _indices(4)
-ADDRESSES = range(EVALUATE, SPRINGS + 1)
+#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list, if any (`routines.emission`). DESCRIBE,
+#: RECORD_CALLS: of all that the record has. RUN: of other lists: CORRECT, DISPLACE, SPRINGS (`mechanics.responses`)
+EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RECORD_CALLS, *_ = ADDRESSES = _indices(12)
+RUN, CORRECT, DISPLACE, SPRINGS = ADDRESSES[8:]
 PART = 32  #: bytes from a part of a list to the next
 
 # Topology in h -------------------------------------------------------------------------------------------------------

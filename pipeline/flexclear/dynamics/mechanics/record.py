@@ -10,7 +10,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
-from flexclear.dynamics.mechanics.evaluation import Loops, jacobian
+from flexclear.dynamics.mechanics.loops import Loops, jacobian
 from flexclear.dynamics.mechanics.mechanism import Carrier, Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Site

@@ -13,16 +13,14 @@ from flexclear.dynamics.mechanics import trees as t
 from flexclear.dynamics.mechanics.evaluation import (
     REPORTS,
     Influence,
-    Loops,
     answered,
     eliminated,
     influence,
-    linked,
-    passed_inwards,
     placed,
     respond,
     status,
 )
+from flexclear.dynamics.mechanics.loops import Loops, linked, passed_inwards
 from flexclear.dynamics.mechanics.mechanism import Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.vectors import ZERO, Wrench
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell
