@@ -5,6 +5,7 @@ is compared with a closed form. Uncompiled, because they take some hundred evalu
 """
 
 import json
+import os
 import re
 import shutil
 from math import exp, sinh
@@ -120,6 +121,25 @@ def test_surfaces(tree: Path) -> None:
     # the integrator's tolerance is 1e-10, of millimetres; four contacts
     np.testing.assert_allclose(run["position"].values[:, 0, 0], across, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(run["position"].values[:, 0, 2], 3.0 * t, rtol=0.0, atol=1e-12)
+
+
+#: steps' functions against kernels, as for parts of the program
+COMPARED = """
+import sys
+from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.model import tabulate
+from flexclear.scene.load import load_scene
+from tests.properties.articulated_chains import evaluated
+from tests.properties.test_routines import assert_alike
+
+for path in sys.argv[1:]:
+    assert_alike(evaluated(tabulate(build(load_scene(path), {})), turns=0.01))  # the ball touches the tube
+"""
+
+
+def test_steps_compute_what_kernels_do(root: Path, tree: Path) -> None:
+    scenes = [examples(root) / f"{name}.toml" for name in ("oldham", "ball_in_tube", "quadratic_drag")]
+    python("-c", COMPARED, *scenes, cwd=tree, PYTHONPATH=os.pathsep.join(map(str, (tree / "pipeline", root))))
 
 
 def test_a_derived_result(tree: Path) -> None:
