@@ -235,10 +235,9 @@ def test_equal_topologies_give_equal_code(lanes: int) -> None:
     assert reported() == reported()
 
 
-def test_friction_of_ideal_joints_is_in_what_steps_evaluate_and_not_in_linear_analyses() -> None:
+def test_friction_of_ideal_joints_is_in_what_steps_evaluate() -> None:
     parts = tabulate(build(load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), {})).parts
     assert "joint_friction" in sources.specialised(parts, ())
-    assert "joint_friction" not in sources.rates(parts)
 
 
 def test_a_magnitude_is_never_below_zero_and_may_be_below_more() -> None:

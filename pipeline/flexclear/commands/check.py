@@ -1,6 +1,6 @@
 """``flexclear check``: all errors of scenes, recipes and sweeps at once, with file and line; nothing is run.
 
-The checks take seconds, without modes and without compilation: meshes, the start, free motions.
+The checks take seconds, without compilation: meshes, modes of small ones, the start, free motions.
 """
 
 from __future__ import annotations

@@ -223,11 +223,6 @@ def _rows(topology: Topology) -> str:
     return "".join(f"    {row},\n" for row in topology)
 
 
-def rates(parts: Parts) -> str:
-    """Return the source of the kernel `rates` for Python (`specialise.dual`), without friction of ideal joints."""
-    return _equations(parts, whole=False).text("", _formulas(parts))
-
-
 def for_python(parts: Parts) -> Iterator[tuple[str, str, str]]:
     """Yield name, kernel and source of all with which Python evaluates and observes a state, without compilation.
 
@@ -240,14 +235,13 @@ def for_python(parts: Parts) -> Iterator[tuple[str, str, str]]:
         yield name, file.kernel, file.text("", formulas if name == "evaluate" else "")
 
 
-def _equations(parts: Parts, *, whole: bool = True) -> Composition:
-    """Return a file for the right-hand side; whole: with friction of ideal joints."""
+def _equations(parts: Parts) -> Composition:
+    """Return a file for the right-hand side."""
     file = _forces(parts, "right-hand side of", "rates", (RIGHT_HAND_SIDE, "make_rates"))
     file.given["tree"] = file.tree
     if parts.closures:
         file.add_closures()
-    if whole:
-        file.add_effects("evaluate")
+    file.add_effects("evaluate")
     return file
 
 

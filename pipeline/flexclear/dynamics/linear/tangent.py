@@ -11,17 +11,12 @@ step width would fit all.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile import sources
-from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.linear.bench import (
     Bench,
     acting_wrenches,
@@ -31,11 +26,10 @@ from flexclear.dynamics.linear.bench import (
     set_drives,
     state,
 )
-from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.run.evaluation import closure_rows
-from flexclear.dynamics.run.evaluation.tree_factor import bias
 from flexclear.dynamics.specialise import dual
+from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.system.errors import SolverError
 
 #: relative singular values of the closure rows below which rows are redundant
@@ -151,35 +145,37 @@ def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multiplie
     directions: changes of the state, (directions, NY).  multipliers: constant, (rows,).  Raises SolverError where the
     equations are singular.
     """
-    engine, model, count = bench.engine, bench.model, len(directions)
-    w = changed(bench, q, directions)
-    o = engine.h[m.JACOBIAN]
-    rows = selection.dense_rows(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
-    forces = dual.changes(bias(engine, w), count)
-    return (forces - multipliers @ rows) @ modes_of(model.arrays).T
+    rates = changed(bench, q, directions, multipliers)
+    return dual.changes(rates[bench.model.speeds], len(directions)) @ modes_of(bench.model.arrays).T
 
 
-def changed(bench: Bench, q: np.ndarray, directions: np.ndarray, laws: np.ndarray | None = None) -> np.ndarray:
-    """Return the work space with its changes after an evaluation at rest in positions q.
+def changed(
+    bench: Bench,
+    q: np.ndarray,
+    directions: np.ndarray,
+    multipliers: np.ndarray | None = None,
+    laws: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return the rates of the state at rest in positions q, with their changes; of speeds the forces that hold them, as
+    `mechanics.balance` has them.
 
-    directions: changes of the state, (directions, NY).  laws: of the entries of the table LAW, (directions, entries).
+    directions: changes of the state, (directions, NY).  multipliers: (rows,), zero by default.  laws: changes of the
+    entries of the table LAW, (directions, entries).
     """
-    engine, model = bench.engine, bench.model
+    from flexclear.dynamics.mechanics.balance import balanced  # here: they import the compiler
+    from flexclear.dynamics.mechanics.of_topology import mechanism_of
+    from flexclear.dynamics.mechanics.tables import Tables
+    from flexclear.dynamics.routines.numbers import Numbers
+
+    engine, model, h = bench.engine, bench.model, bench.engine.h
     y = state(bench, q)
-    # stores the laws of time, and all work arrays, in the work space
-    closure_rows.evaluate(engine, y, bench.time)
-    h, w = engine.h.tolist(), list(engine.w)
+    closure_rows.evaluate(engine, y, bench.time)  # stores the laws of time in the work space
+    w, topology = list(engine.w), topology_of(model.arrays, h)
     w[h[m.Y] : h[m.Y] + len(y)] = dual.seeded(y, directions)
     if laws is not None:
         first = h[m.LAW.at]
         w[first : first + laws.shape[1]] = dual.seeded(engine.w[first : first + laws.shape[1]], laws)
-    with np.errstate(all="ignore"):  # as in compiled code, unused values may be infinite
-        _rates(model.parts)(h, list(model.arrays.f), w, engine.n.tolist(), h[m.Y], h[m.SLOPES])
-    return np.array(w, dtype=object)
-
-
-@cache
-def _rates(parts: Parts) -> Callable:
-    scope: dict[str, Any] = {}
-    exec(sources.rates(parts), scope)
-    return dual.plain(scope["rates"])
+    calls = Numbers(h, model.arrays.f, np.array(w, dtype=object), engine.n, int(h[m.Y]), int(h[m.SLOPES]))
+    given = np.zeros(h[m.N_KEPT_ROWS]) if multipliers is None else multipliers
+    balanced(mechanism_of(Tables(model.parts, topology)), list(given), calls)
+    return calls.rates[: len(y)]

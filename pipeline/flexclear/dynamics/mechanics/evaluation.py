@@ -87,10 +87,7 @@ def eliminated(mechanism: Mechanism) -> Any:
     for link in reversed(mechanism.links):
         carried_on = int(link.on_link)
         if modes := link.modes:
-            more: Any = [0.0] * len(modes.q)
-            for station in modes.stations:
-                more = f.bend(more, station, modes.q)
-            need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
+            need = needed(link, modes)
             modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
         elif link.driven or link.watched:
             link.rest = t.resist(link.motion, link.body, link.beyond)
@@ -108,6 +105,14 @@ def eliminated(mechanism: Mechanism) -> Any:
 
 #: frames and wrenches on them, one for each row
 Ends = Sequence[tuple[Frame, c.Wrenches]]
+
+
+def needed(link: Link, modes: Modes) -> f.Need:
+    """Return what a flexible body needs alone."""
+    more: Any = [0.0] * len(modes.q)
+    for station in modes.stations:
+        more = f.bend(more, station, modes.q)
+    return f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
 
 
 class Spread(NamedTuple):

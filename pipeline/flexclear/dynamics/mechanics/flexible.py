@@ -41,6 +41,7 @@ from flexclear.dynamics.mechanics.trees import (
 )
 from flexclear.dynamics.mechanics.vectors import (
     AT_REST,
+    WITHOUT,
     ZERO,
     Inertia,
     Matrix,
@@ -298,6 +299,17 @@ def bend(forces: Numbers, station: Station, q: Numbers) -> list[Any]:
     on_curvature = on_curvature - station.stiffness @ kappa
     both = zip(forces, by_mode(station.rotation), by_mode(station.curvature), strict=True)
     return [f + dot(on_rotation, turn) + dot(on_curvature, curve) for f, turn, curve in both]
+
+
+@routine
+def held(body: Need, beyond: Sequence[Beyond]) -> tuple[list[Any], Resistance]:
+    """Return the forces on the shapes of a body that hold them, and what its joint must resist then: a wrench."""
+    F, forces = body.F, list(body.forces)
+    for (_, wrench), columns in beyond:
+        F = F + wrench
+        for i, column in enumerate(columns):
+            forces[i] = forces[i] + wrench.on(column)
+    return forces, Resistance(WITHOUT, F)
 
 
 @routine

@@ -194,6 +194,13 @@ def pushed(wrench: Wrench) -> Resistance:
     return Resistance(WITHOUT, wrench * -1.0)
 
 
+@routine
+def pulled(wrenches: Sequence[Wrench], sizes: Numbers) -> Resistance:
+    """Return wrenches per unit, each times its size, in the same way."""
+    parts = [wrench * size for wrench, size in zip(wrenches, sizes, strict=True)]
+    return Resistance(WITHOUT, sum(parts, Wrench(ZERO, ZERO)) * -1.0)
+
+
 def resistance(motion: Motion, body: Body, beyond: Sequence[Beyond]) -> Resistance:
     """Return the inertia of a body about its origin, and the wrench that its known acceleration needs.
 
@@ -243,6 +250,13 @@ def without_coordinates(carried_on: int, rest: Resistance, bounds: Bounds, step:
 
 
 free_joint = routine(without_coordinates)
+
+
+@routine
+def held(step: Step, rest: Resistance) -> tuple[list[Any], Resistance]:
+    """Return the forces along the coordinates of a joint that hold what it carries, and what the body that carries it
+    must resist of it then: a wrench."""
+    return [rest.F.on(s) for s in step.S], Resistance(WITHOUT, rest.F.about(step.p_PB))
 
 
 @routine

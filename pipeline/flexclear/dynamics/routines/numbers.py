@@ -66,6 +66,11 @@ class Numbers(CallList):
         return int(inside if stretch < 0 else self._h[stretch] + inside)
 
     @property
+    def rates(self) -> np.ndarray:
+        """Rates of the state, and what follows them in memory."""
+        return self._arrays[RATES]
+
+    @property
     def report(self) -> int:
         """What the list reports of its evaluation."""
         return int(self._report[0])

@@ -1,6 +1,6 @@
-"""Dual numbers with changes along several directions: kernels run on them give exact derivatives without a compiler.
+"""Dual numbers with changes along several directions: routines run on them give exact derivatives without a compiler.
 
-Every number that depends on a changed one carries its derivatives. Kernels run in Python (`plain`), so iterations are
+Every number that depends on a changed one carries its derivatives. Routines run in Python, so iterations are
 differentiated too, and no mechanism is too large. A run takes some microseconds per operation for all directions
 together; where one mechanism is differentiated thousands of times, compiled tangents (`derivative`) are faster.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from flexclear.dynamics import memory as m
@@ -39,19 +37,15 @@ def _from_gains(engine: Engine) -> np.ndarray:
     return L
 
 
-def carried_wrenches(engine: Engine, w: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def carried_wrenches(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
     """Return the wrench that each link and its subtree need for the motion without free accelerations.
 
-    Moments about the kernels' origin and forces, shapes (links, 3).  w: as of `bias`.
+    Moments about the kernels' origin and forces, shapes (links, 3).
     """
-    w = engine.w if w is None else w
-    moments, pushes = (_vectors(engine, w, m.WRENCH, field) for field in (m.WRENCH.moment, m.WRENCH.force))
-    own, origins = (
-        _vectors(engine, w, m.ARTICULATED, m.ARTICULATED.own_force),
-        _vectors(engine, w, m.LINK_FRAMES, m.LINK_FRAMES.origin),
-    )
-    moments = moments + _vectors(engine, w, m.ARTICULATED, m.ARTICULATED.own_moment) + np.cross(origins, own)
-    pushes = pushes + own
+    needed, own = engine.table(m.WRENCH), engine.table(m.ARTICULATED)
+    origins = engine.table(m.LINK_FRAMES)["origin"]
+    moments = needed["moment"] + own["own_moment"] + np.cross(origins, own["own_force"])
+    pushes = needed["force"] + own["own_force"]
     for i in range(len(moments) - 1, 0, -1):
         above = engine.model.links[i].branch.parent
         moments[above] += moments[i]
@@ -59,15 +53,10 @@ def carried_wrenches(engine: Engine, w: np.ndarray | None = None) -> tuple[np.nd
     return moments, pushes
 
 
-def bias(engine: Engine, w: np.ndarray | None = None) -> np.ndarray:
-    """Return the generalised forces that the motion needs without free accelerations, shape (nv,).
-
-    w: the work space; that of the last evaluation, or one of numbers with changes (`specialise.dual`).
-    """
-    model, w = engine.model, engine.w if w is None else w
-    moments, pushes = carried_wrenches(engine, w)
-    turns, shifts = (_vectors(engine, w, m.COLUMNS, field) for field in (m.COLUMNS.angular, m.COLUMNS.linear))
-    numbering, forces = model.numbering, _stretch(engine, w, m.MODAL_BIAS)[: model.nv].copy()
+def bias(engine: Engine) -> np.ndarray:
+    """Return the generalised forces that the motion needs without free accelerations, shape (nv,)."""
+    model, columns, (moments, pushes) = engine.model, engine.table(m.COLUMNS), carried_wrenches(engine)
+    numbering, forces = model.numbering, engine.view(m.MODAL_BIAS)[: model.nv].copy()
     modal = [k for modes in numbering.modal_coordinates.values() for k in modes]
     forces[np.setdiff1d(np.arange(model.nv), modal)] = 0.0
     for i in range(len(moments) - 1, 0, -1):
@@ -75,14 +64,5 @@ def bias(engine: Engine, w: np.ndarray | None = None) -> np.ndarray:
         shapes = numbering.moving(above) if model.links[above].flexible else ()
         mine = {*shapes, *(c for c in numbering.coordinates[i] if c < model.nv)}
         for k, column in (pair for pair in numbering.joint_route(i) if pair[0] in mine):
-            forces[k] = forces[k] + np.sum(turns[column] * moments[i] + shifts[column] * pushes[i])
+            forces[k] += columns["angular"][column] @ moments[i] + columns["linear"][column] @ pushes[i]
     return forces
-
-
-def _stretch(engine: Engine, w: np.ndarray, index: int) -> np.ndarray:
-    return w[engine.h[index] : engine.h[index] + engine.lengths[index]]
-
-
-def _vectors(engine: Engine, w: np.ndarray, table: Any, field: int) -> np.ndarray:
-    """Return a vector of each row of a table."""
-    return _stretch(engine, w, table.at).reshape(-1, table.size)[:, field : field + 3]
