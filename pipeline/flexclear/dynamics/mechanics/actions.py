@@ -150,7 +150,7 @@ def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[Any, tuple[Any, .
 def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
     """Return the friction of ideal joints, whose links are marked; carriers: the ground, then all links."""
     table, laws, made = tables.table, tables.parts.kinds("joint_friction"), list[Rubbing]()
-    slot = tables.size(m.SIZES["joint_friction_slot"])
+    slot, count = (tables.size(m.SIZES[name]) for name in ("joint_friction_slot", "n_bearings"))
     for k, row in enumerate(table(m.NAMED["rubbing"])):
         bearings = []
         for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
@@ -164,5 +164,8 @@ def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier])
         if isinstance(link, Link):
             link.watched = True
         joint, second = (frames[row["site_a"]], frames[row["site_b"]]), -1 if row["reversed"] else 1
-        made.append(Rubbing(joint, link, second, int(row["closure"]), bearings, slot + k))
+        reactions = [
+            tables.row(m.NAMED["reactions"], k * (1 + count) + e) for e in range((1 + count) * tables.recorded)
+        ]
+        made.append(Rubbing(joint, link, second, int(row["closure"]), bearings, slot + k, reactions))
     return made

@@ -167,6 +167,9 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
     places = [one for joint in mechanism.rubbing for one in joint.bearings]
     loads, bends = [one.load for one in places], [cell for one in places for cell in one.bends]
     reactions = reactions_of(mechanism, loops, list(zip(influences, of_bearing, strict=True)))
+    for joint, smooth, parts in zip(of_bearing, *reactions, strict=True):
+        for row, wrench in zip(joint.reactions, (smooth, *parts), strict=False):
+            calls.write(row, wrench)
     found, kinks, jammed = loads_of(bearings, *reactions, calls)
     calls.write([*loads, *bends], [*found, *kinks])
 

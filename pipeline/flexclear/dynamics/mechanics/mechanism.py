@@ -209,7 +209,8 @@ class Rubbed(NamedTuple):
 
 class Rubbing(NamedTuple):
     """Friction of an ideal joint. frames: of the joint.  link: that it carries, or None.  second: 1 when that is on the
-    side of the second frame, else -1.  closure: of a joint that closes a loop, or -1.  book: of the ledger."""
+    side of the second frame, else -1.  closure: of a joint that closes a loop, or -1.  book: of the ledger.  reactions:
+    where the record stores those of the joint, without friction, then per normal force of each bearing."""
 
     frames: tuple[Frame, Frame]
     link: Link | None
@@ -217,6 +218,7 @@ class Rubbing(NamedTuple):
     closure: int
     bearings: Sequence[Rubbed]
     book: int
+    reactions: Sequence[Cells]
 
 
 class Mechanism(NamedTuple):
