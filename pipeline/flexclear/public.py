@@ -229,11 +229,7 @@ def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def equilibrium(
-    scene: AnyScene,
-    time: float | None = None,
-    drives: Mapping[str, float] | None = None,
-    *,
-    moving: bool = False,
+    scene: AnyScene, time: float | None = None, drives: Mapping[str, float] | None = None, *, moving: bool = False
 ) -> xr.Dataset:
     """Return the static equilibrium of a mechanism close to its start pose, the drives held (schema EQUILIBRIUM).
 
@@ -274,11 +270,7 @@ def frequencies(
 
 
 def state_space(
-    scene: AnyScene,
-    time: float | None = None,
-    drives: Mapping[str, float] | None = None,
-    *,
-    held: bool = False,
+    scene: AnyScene, time: float | None = None, drives: Mapping[str, float] | None = None, *, held: bool = False
 ) -> xr.Dataset:
     """Return matrices A, B, C, D of small motions about `equilibrium` (schema STATE_SPACE), in changes from there.
 

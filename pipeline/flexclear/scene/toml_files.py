@@ -52,7 +52,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 #: `check` reads a scene at several of its steps
-_parsed = lru_cache(maxsize=4)(tomllib.loads)
+_parsed = lru_cache(maxsize=16)(tomllib.loads)
 
 
 def _neighbours(path: Path) -> str | None:
@@ -65,13 +65,7 @@ def _neighbours(path: Path) -> str | None:
 def recipe_frames(mesh: str) -> list[str] | None:
     """Return the names of the frames in a mesh recipe; None when it cannot be read, which is reported elsewhere."""
     try:
-        status = Path(mesh).stat()
-        return _frames(mesh, status.st_mtime_ns, status.st_size)
+        frames = read_toml(Path(mesh)).get("frames")
     except (OSError, ValueError, InputError):
         return None
-
-
-@lru_cache
-def _frames(mesh: str, changed: int, size: int) -> list[str] | None:
-    frames = read_toml(Path(mesh)).get("frames")
     return list(frames) if isinstance(frames, dict) else None

@@ -81,9 +81,8 @@ class Engine:
     @cached_property
     def breaks(self) -> np.ndarray:
         """Return start, jumps of laws, samples, end [s]; times that differ only by rounding are merged."""
-        starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
-        for begun in self._begun:
-            inner |= {float(t) for t in starts[begun[1:]]}
+        starts = self.model.arrays.table(m.PIECES)["start"]
+        inner = {float(t) for begun in self._begun for t in starts[begun[1:]]}
         for period in {load.period for load in self.model.scene.load.values() if isinstance(load, SampledPid)}:
             inner |= set((self.start + period * np.arange(1, np.ceil((self.end - self.start) / period))).tolist())
         shortest = SHORTEST * (self.end - self.start)
@@ -111,11 +110,9 @@ class Engine:
 
     def piece(self, law: int, t: float) -> int:
         """Return the piece of a law that holds right after `t`."""
-        first = self.pieces[self.segments(t, after=True), law]
-        last = self.model.arrays.table(m.PIECE_HARMONICS)["last"][first]
-        return int(
-            first + np.searchsorted(self.model.arrays.table(m.PIECES)["start"][first + 1 : last + 1], t, side="right")
-        )
+        first, count = self.model.arrays.table(m.LAWS)[law]
+        passed = np.searchsorted(self.model.arrays.table(m.PIECES)["start"][first : first + count], t, side="right")
+        return int(first + max(passed - 1, 0))
 
     def segments(self, times: np.ndarray | float, *, after: bool) -> np.ndarray:
         """Return the segment that contains each time; on a break, the one before it, or the one `after` it."""
