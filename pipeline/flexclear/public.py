@@ -343,7 +343,7 @@ def render(scene: AnyScene) -> Path:
     return open_workplace().made(*Graph(one).render.values(), jobs=1)[0].folder
 
 
-def show(scene: AnyScene | xr.Dataset, folder: str | Path | None = None) -> Any:
+def show(scene: AnyScene | xr.Dataset | xr.DataTree, folder: str | Path | None = None) -> Any:
     """Return a page to turn, which a notebook shows: the motion of a run, or the start pose of a scene with all names.
 
     A start takes seconds: nothing is run or compiled.  folder: also write the page there, and of a start the picture,
@@ -356,11 +356,11 @@ def show(scene: AnyScene | xr.Dataset, folder: str | Path | None = None) -> Any:
     >>> [mark.text for mark in seen.view.marks], seen.refused
     (['bob', 'hinge'], None)
     """
-    from xarray import Dataset
+    from xarray import Dataset, DataTree
 
     target = None if folder is None else Path(folder)
-    if isinstance(scene, Dataset):
-        return start_pose.motion(scene, target)
+    if isinstance(scene, (Dataset, DataTree)):
+        return start_pose.motion(scene if isinstance(scene, Dataset) else scene.to_dataset(), target)
     return start_pose.start(_loaded(scene), target)
 
 

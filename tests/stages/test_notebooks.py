@@ -96,6 +96,12 @@ def test_a_run_is_a_page_to_turn_in_a_notebook_and_in_a_file(root: Path, tmp_pat
         assert window.logs() == ([], [])
 
 
+def test_a_stored_run_is_a_page_too(root: Path):
+    """As `fc.open` returns it, without its scene."""
+    shown = fc.show(xr.DataTree(short(root)))
+    assert b"Swing &lt; 1: motion" in shown.page
+
+
 def test_a_run_whose_bodies_are_not_known_is_refused(root: Path):
     run = xr.Dataset(attrs={"parameters": '{"body": {"rod": {"type": "flexible"}}}'})
     with pytest.raises(fc.InputError, match=r"hint: give what fc.run returns: fc.show\(fc.run\(scene\)\)"):
