@@ -25,14 +25,7 @@ from flexclear.scene.variants import ideal, replaceable_contacts
 from flexclear.stages import meshing, modal_analysis, reduction, scenes, show, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options, open_workplace
-from flexclear.system.errors import (
-    FlexclearError,
-    InputError,
-    ResourceError,
-    SolverError,
-    errors_of,
-    refuse,
-)
+from flexclear.system.errors import FlexclearError, InputError, ResourceError, SolverError, errors_of, refuse
 from flexclear.system.progress import silent
 from flexclear.workflow.execute import states
 
