@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.mechanics import trees
 from flexclear.dynamics.mechanics.of_topology import list_of
 from flexclear.dynamics.mechanics.responses import CLOSING, LISTS
@@ -48,7 +49,7 @@ class Listed:
     def __call__(self, where: int, part: int = 0) -> np.ndarray:
         """Rates of the state after a part of a list."""
         given = self.found.h, self.found.model.arrays.f, self.w, self.n, 0.1, self.y, self.dy
-        self._run(*given, 2 * m.PART * where + m.PART * part)
+        self._run(*given, 2 * PART * where + PART * part)
         assert self.n[m.EVALUATION] == m.OK
         return self.rates
 

@@ -164,12 +164,9 @@ class Room:
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
-#: addresses of compiled functions, zero until the engine writes them (`compile.calls`). RATES: the function that steps
-#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`);
-#: RUN: the function that runs other lists: CORRECT, DISPLACE, and SPRINGS in two parts (`mechanics.responses`)
-EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RUN, CORRECT, DISPLACE, SPRINGS = _indices(11)
-ADDRESSES = range(EVALUATE, SPRINGS + 1)
-PART = 32  #: bytes from a part of a list to the next
+#: addresses of functions, zero until the engine writes them (`compile.calls`). RATES: what steps evaluate, EVALUATE's or
+#: one that stores only what they read; CALLS: its list, if any (`routines`); RUN: runs those of `mechanics.responses`
+EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RUN, CORRECT, MOVE, SPRINGS = ADDRESSES = _indices(11)
 
 # Topology in h -------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;

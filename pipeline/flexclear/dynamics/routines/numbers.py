@@ -54,5 +54,5 @@ class Numbers(CallList):
 
     @property
     def report(self) -> int:
-        """What the list reports of its evaluation."""
+        """Return what the list reports of its evaluation."""
         return int(self._report[0])

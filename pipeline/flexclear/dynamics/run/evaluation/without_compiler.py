@@ -13,6 +13,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
+from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
@@ -60,7 +61,7 @@ def uncompiled(model: Model, mobility: Mobility) -> Engine:
 
 def _kernels(model: Model) -> SimpleNamespace:
     run = lists_in_python(model)
-    calls = SimpleNamespace(correct=lambda *given: run(*given, 2 * m.PART * m.CORRECT))
+    calls = SimpleNamespace(correct=lambda *given: run(*given, 2 * PART * m.CORRECT))
     calls.rates = lambda d, *given: calls.evaluate(d.h, d.f, d.w, d.n, *given)
     for name, kernel, source in sources.for_python(model.parts):
         scope: dict[str, Any] = {"calls": calls}
