@@ -83,7 +83,7 @@ def test_loops_stop_opening_by_the_least_change_in_the_metric(name: str) -> None
     N = M[:nv, :nv] + CLOSING**2 * np.diag(modal_stiffness(found))
     by = np.linalg.solve(N, J.T)
     expected = -by @ np.linalg.solve(J @ by, found.stretch(m.RESIDUAL_RATE)[kept])
-    change = Listed(found)(m.CORRECT)[found.model.speeds]
+    change = Listed(found)(m.CLOSE)[found.model.speeds]
     assert apart(change, expected) < ROUNDING
     free = np.linalg.svd(J)[2][len(J) :]  # motions that keep the loops
     assert np.abs(free @ N @ change).max() < ROUNDING * np.abs(N @ change).max()
@@ -97,8 +97,8 @@ def test_repeated_changes_close_loops(name: str) -> None:
     run, count = Listed(found), found.model.nq + found.model.nv
     kept = selection.selected_indices(found.model, found.h)
     for _ in range(8):
-        run.w[run.y : run.y + count] += run(m.CORRECT)[:count]
-    run(m.CORRECT)
+        run.w[run.y : run.y + count] += run(m.CLOSE)[:count]
+    run(m.CLOSE)
     for stretch, rounding in ((m.RESIDUAL, 1e-14), (m.RESIDUAL_RATE, 1e-12)):
         left = run.w[found.h[stretch] :][: found.lengths[stretch]][kept]
         assert np.abs(left).max() < rounding * max(1.0, np.abs(found.stretch(stretch)).max())

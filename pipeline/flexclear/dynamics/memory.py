@@ -166,7 +166,7 @@ class Room:
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of functions, zero until the engine writes them (`compile.calls`). RATES: what steps evaluate, EVALUATE's or
 #: one that stores only what they read; CALLS: its list, if any (`routines`); RUN: runs those of `mechanics.responses`
-EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RUN, CORRECT, MOVE, SPRINGS = ADDRESSES = _indices(11)
+EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RUN, CLOSE, MOVE, SPRINGS = ADDRESSES = _indices(11)
 
 # Topology in h -------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;

@@ -104,7 +104,7 @@ def project(h, f, w, n, t, y, dy, tolerance):
 @kernel
 def correct(h, f, w, n, t, y, dy):
     """Store, as rates of the state evaluated last, the changes that close its loops: `mechanics.responses`."""
-    call(h[m.RUN], (h, f, w, n, float(t), y, dy, h[m.CORRECT]))
+    call(h[m.RUN], (h, f, w, n, float(t), y, dy, h[m.CLOSE]))
 
 
 @kernel

@@ -106,7 +106,7 @@ def powers_of_drives(mechanism: Mechanism, loops: Loops, by: Influence) -> list[
 
 #: parts of each list, by the index of its address in h; each takes what the one before returns
 LISTS: dict[int, tuple[Callable, ...]] = {
-    m.CORRECT: (corrected,),
+    m.CLOSE: (corrected,),
     m.MOVE: (displaced,),
     m.SPRINGS: (factored, released),
 }

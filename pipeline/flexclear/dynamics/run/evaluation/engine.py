@@ -176,7 +176,7 @@ class Engine:
     def _connect_lists(self, progress: Progress = silent) -> None:
         """Connect the lists, besides the steps', that compiled functions run for the selected rows."""
         size, traits = self.model.arrays.size, self.method.traits
-        used = {m.CORRECT: size(m.N_CLOSURES), m.MOVE: traits.retracts, m.SPRINGS: self.method.room.oscillations}
+        used = {m.CLOSE: size(m.N_CLOSURES), m.MOVE: traits.retracts, m.SPRINGS: self.method.room.oscillations}
         rows, places = self.selected.tobytes(), [where for where, needed in used.items() if needed]
         if INTERPRETED and not self.h[m.RUN]:
             run = lists_in_python(self.model)

@@ -61,7 +61,7 @@ def uncompiled(model: Model, mobility: Mobility) -> Engine:
 
 def _kernels(model: Model) -> SimpleNamespace:
     run = lists_in_python(model)
-    calls = SimpleNamespace(correct=lambda *given: run(*given, 2 * PART * m.CORRECT))
+    calls = SimpleNamespace(correct=lambda *given: run(*given, 2 * PART * m.CLOSE))
     calls.rates = lambda d, *given: calls.evaluate(d.h, d.f, d.w, d.n, *given)
     for name, kernel, source in sources.for_python(model.parts):
         scope: dict[str, Any] = {"calls": calls}
