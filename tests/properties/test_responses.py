@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.mechanics import trees
 from flexclear.dynamics.mechanics.of_topology import list_of
 from flexclear.dynamics.mechanics.responses import CLOSING, LISTS
@@ -48,7 +49,7 @@ class Listed:
     def __call__(self, where: int, part: int = 0) -> np.ndarray:
         """Rates of the state after a part of a list."""
         given = self.found.h, self.found.model.arrays.f, self.w, self.n, 0.1, self.y, self.dy
-        self._run(*given, 2 * m.PART * where + m.PART * part)
+        self._run(*given, 2 * PART * where + PART * part)
         assert self.n[m.EVALUATION] == m.OK
         return self.rates
 
@@ -82,7 +83,7 @@ def test_loops_stop_opening_by_the_least_change_in_the_metric(name: str) -> None
     N = M[:nv, :nv] + CLOSING**2 * np.diag(modal_stiffness(found))
     by = np.linalg.solve(N, J.T)
     expected = -by @ np.linalg.solve(J @ by, found.stretch(m.RESIDUAL_RATE)[kept])
-    change = Listed(found)(m.CORRECT)[found.model.speeds]
+    change = Listed(found)(m.CLOSE)[found.model.speeds]
     assert apart(change, expected) < ROUNDING
     free = np.linalg.svd(J)[2][len(J) :]  # motions that keep the loops
     assert np.abs(free @ N @ change).max() < ROUNDING * np.abs(N @ change).max()
@@ -96,8 +97,8 @@ def test_repeated_changes_close_loops(name: str) -> None:
     run, count = Listed(found), found.model.nq + found.model.nv
     kept = selection.selected_indices(found.model, found.h)
     for _ in range(8):
-        run.w[run.y : run.y + count] += run(m.CORRECT)[:count]
-    run(m.CORRECT)
+        run.w[run.y : run.y + count] += run(m.CLOSE)[:count]
+    run(m.CLOSE)
     for stretch, rounding in ((m.RESIDUAL, 1e-14), (m.RESIDUAL_RATE, 1e-12)):
         left = run.w[found.h[stretch] :][: found.lengths[stretch]][kept]
         assert np.abs(left).max() < rounding * max(1.0, np.abs(found.stretch(stretch)).max())

@@ -163,12 +163,11 @@ class Room:
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
-#: addresses of compiled functions, zero until the engine writes them (`compile.calls`). RATES: the function that steps
-#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list, if any (`routines.emission`). DESCRIBE,
-#: RECORD_CALLS: of all that the record has. RUN: of other lists: CORRECT, DISPLACE, SPRINGS (`mechanics.responses`)
+#: addresses of functions, zero until the engine writes them (`compile.calls`). RATES: what steps evaluate, EVALUATE's
+#: or one that stores only what they read; CALLS: its list, if any (`routines`); DESCRIBE, RECORD_CALLS: of all that the
+#: record has; RUN: runs those of `mechanics.responses`
 EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RECORD_CALLS, *_ = ADDRESSES = _indices(12)
-RUN, CORRECT, DISPLACE, SPRINGS = ADDRESSES[8:]
-PART = 32  #: bytes from a part of a list to the next
+RUN, CLOSE, MOVE, SPRINGS = ADDRESSES[8:]
 
 # Topology in h -------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;

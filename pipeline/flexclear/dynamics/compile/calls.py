@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 
 import flexclear.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile.files import SIGNATURES, compiles, interpreted
+from flexclear.dynamics.compile.files import PART, SIGNATURES, compiles, interpreted
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import INTERPRETED, PLAIN, kernel
 
@@ -104,7 +104,7 @@ def project(h, f, w, n, t, y, dy, tolerance):
 @kernel
 def correct(h, f, w, n, t, y, dy):
     """Store, as rates of the state evaluated last, the changes that close its loops: `mechanics.responses`."""
-    call(h[m.RUN], (h, f, w, n, float(t), y, dy, h[m.CORRECT]))
+    call(h[m.RUN], (h, f, w, n, float(t), y, dy, h[m.CLOSE]))
 
 
 @kernel
@@ -112,7 +112,7 @@ def retract(d, y, displacement, out):
     """Store the positions after a displacement; all are indices in w."""
     for k in range(d.nq):
         d.w[out + k] = d.w[y + k]
-    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, d.time, out, displacement - d.nq, d.h[m.DISPLACE]))
+    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, d.time, out, displacement - d.nq, d.h[m.MOVE]))
 
 
 @kernel
@@ -125,7 +125,7 @@ def factor_springs(d, t, y):
 @kernel
 def release_spring(d, t, y, response):
     """Replace forces on modes, in a row like the state's rates, by what they cause."""
-    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, float(t), y, response, d.h[m.SPRINGS] + m.PART))
+    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, float(t), y, response, d.h[m.SPRINGS] + PART))
 
 
 @kernel

@@ -104,8 +104,8 @@ def powers_of_drives(mechanism: Mechanism, loops: Loops, by: Influence) -> list[
 
 #: parts of each list, by the index of its address in h; each takes what the one before returns
 LISTS: dict[int, tuple[Callable, ...]] = {
-    m.CORRECT: (corrected,),
-    m.DISPLACE: (displaced,),
+    m.CLOSE: (corrected,),
+    m.MOVE: (displaced,),
     m.SPRINGS: (factored, released),
 }
 

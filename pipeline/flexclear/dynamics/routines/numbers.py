@@ -72,5 +72,5 @@ class Numbers(CallList):
 
     @property
     def report(self) -> int:
-        """Status that the list reports of its evaluation."""
+        """Return what the list reports of its evaluation."""
         return int(self._report[0])

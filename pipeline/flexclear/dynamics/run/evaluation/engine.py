@@ -12,7 +12,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
-from flexclear.dynamics.compile.files import interpreted
+from flexclear.dynamics.compile.files import PART, interpreted
 from flexclear.dynamics.compile.functions import function, place
 from flexclear.dynamics.compile.sources import WHOLE
 from flexclear.dynamics.effects import scheme_of
@@ -193,12 +193,12 @@ class Engine:
     def _connect_lists(self, progress: Progress = silent) -> None:
         """Connect the lists, besides the steps', that compiled functions run for the selected rows."""
         size, traits = self.model.arrays.size, self.method.traits
-        used = {m.CORRECT: size(m.N_CLOSURES), m.DISPLACE: traits.retracts, m.SPRINGS: self.method.room.oscillations}
+        used = {m.CLOSE: size(m.N_CLOSURES), m.MOVE: traits.retracts, m.SPRINGS: self.method.room.oscillations}
         rows, places = self.selected.tobytes(), [where for where, needed in used.items() if needed]
         if INTERPRETED and not self.h[m.RUN]:
             run = lists_in_python(self.model)
             interpreted[id(run)] = run
-            self.h[m.RUN], self.h[places] = id(run), 2 * m.PART * np.array(places, dtype=np.int64)
+            self.h[m.RUN], self.h[places] = id(run), 2 * PART * np.array(places, dtype=np.int64)
         elif not INTERPRETED:
             for where in places:
                 calls = call_list(self.model, self.h, self.specialised, rows, progress, where)

@@ -17,6 +17,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
+from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.compile.sources import SPECIALISED, WHOLE
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.kernels import INTERPRETED
@@ -118,12 +119,12 @@ def lists_in_python(model: Model) -> Callable:
     def run(
         h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, y: int, dy: int, address: int
     ) -> None:
-        where, part = divmod(int(address), 2 * m.PART)
+        where, part = divmod(int(address), 2 * PART)
         calls = Numbers(h, f, w, n, y, dy)
         if part == 0:
             known[:] = [mechanism_of(Tables(model.parts, topology_of(model.arrays, h)))]
         with calls.building():
-            found = LISTS[where][part // m.PART](known[0], calls, *known[1:])
+            found = LISTS[where][part // PART](known[0], calls, *known[1:])
         known.append(found)
         n[m.EVALUATION] = calls.report
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
+from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
@@ -73,7 +74,7 @@ def without_compiler() -> Iterator[None]:
 def _kernels(model: Model) -> SimpleNamespace:
     calls = SimpleNamespace(describe=described_in_python(model, lambda *given: calls.laws(*given)))
     run = lists_in_python(model)
-    calls.correct = lambda *given: run(*given, 2 * m.PART * m.CORRECT)
+    calls.correct = lambda *given: run(*given, 2 * PART * m.CLOSE)
     calls.rates = lambda d, *given: calls.evaluate(d.h, d.f, d.w, d.n, *given)
     for name, kernel, source in sources.for_python(model.parts):
         scope: dict[str, Any] = {"calls": calls}
