@@ -11,7 +11,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from itertools import zip_longest
 from math import comb, inf, perm, pi, sin
 
@@ -108,7 +108,7 @@ class Pieces:
         every = np.arange(len(self.pieces))
         if len(every) <= FEW:
             return every
-        broken = reduce(np.logical_or, (_jumps(self, every[1:], order, self.starts) for order in range(3)))
+        broken = np.any([_jumps(self, every[1:], order, self.starts) for order in range(3)], axis=0)
         ends = np.append(np.flatnonzero(broken), every[-1])
         return np.asarray(ends[np.searchsorted(ends, every)])
 
