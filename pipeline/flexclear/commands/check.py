@@ -326,6 +326,7 @@ def _assembled(whole: Scene, bodies: Mapping[str, Body], findings: Findings) -> 
     Flexible bodies are undeformed; where their modes are at hand, and of rigid mechanisms, rank, drives and the start
     of the run are checked, too.
     """
+    from flexclear.dynamics.analyses import start_refusals
     from flexclear.dynamics.model.assembly import assemble
     from flexclear.dynamics.model.checks import mechanism_errors
     from flexclear.dynamics.model.plausibility import doubts, start_errors, unused_frames
@@ -340,11 +341,10 @@ def _assembled(whole: Scene, bodies: Mapping[str, Body], findings: Findings) -> 
         mechanism = assemble(mechanism)
     refuse(start_errors(mechanism, final=whole.start is None or whole.start.at != "equilibrium"))
     reduced = _reduced(whole, bodies) if sound else None
-    if reduced:
-        moving = [_movable(_mechanism(whole, bodies, reduced))]
-    for model, mobility in moving:
-        if model.nv <= MOST_COORDINATES:
-            _started(_filled(whole, bodies), reduced or {}, model, mobility, findings)
+    moving = [_movable(_mechanism(whole, bodies, reduced))] if reduced else moving
+    for known in (one for one in moving if one[0].nv <= MOST_COORDINATES):
+        for check in start_refusals(_filled(whole, bodies), reduced or {}, *known):
+            findings.attempt(_as_mistakes()(check), whole.path)
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):
@@ -401,16 +401,6 @@ def _as_mistakes() -> Iterator[None]:
         yield
     except SolverError as error:
         raise InputError("[start]", str(error)) from None
-
-
-def _started(
-    whole: Scene, bundles: Mapping[str, xr.Dataset], model: Model, mobility: Mobility, findings: Findings
-) -> None:
-    """Check what the run refuses at its start, all of which is collected."""
-    from flexclear.dynamics.analyses import start_refusals
-
-    for check in start_refusals(whole, bundles, model, mobility):
-        findings.attempt(_as_mistakes()(check), whole.path)
 
 
 def _starts_ideal(whole: Scene) -> bool:
