@@ -18,6 +18,7 @@ from flexclear.post.overview import comparison
 from flexclear.post.overview.curves import curves
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.owners import COORDINATES
+from flexclear.scene.parts import _hertz
 from flexclear.scene.quantity import KINDS, OF_CONTACTS, Quantity, Recorded, parse, parse_recorded
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError
@@ -272,6 +273,10 @@ def test_any_quantity_can_be_asked_for_in_accuracy(name: str) -> None:
     if name == "slider.acceleration":
         known = closed_form(done["time"].values)["acceleration"]
         assert np.abs(evaluate(done, f"{name}.x").values - known).max() <= 1e-6 * np.abs(known).max()
+
+
+def test_frequencies_are_in_hertz_also_where_they_are_written_as_angular_velocities() -> None:
+    assert [_hertz(value) for value in (3, "3 Hz", "180 rpm", f"{6.0 * np.pi} rad/s")] == pytest.approx([3.0] * 4)
 
 
 def test_frames_of_recipes_have_quantities_without_a_joint() -> None:
