@@ -154,7 +154,7 @@ class CallList:
         """Append a call and return its results; without the first of several, if cells are given to store that."""
         runs = _Runs()
         given = leaves(arguments)
-        places: dict[type, Callable] = {Cell: runs.at, Span: runs.span}
+        places: dict[type, Callable[[Any], Any]] = {Cell: runs.at, Span: runs.span}
         inside = [places[type(one)](one) if type(one) in places else one for one in given]
         targets = None if into is None else tuple(runs.at(cell) for cell in into)
         kind = (function, _shape(arguments), tuple(inside), targets, tuple(runs.arrays))
