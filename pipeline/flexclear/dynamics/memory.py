@@ -164,7 +164,7 @@ class Room:
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
-#: addresses of functions, zero until the engine writes them (`compile.calls`). RATES: what steps evaluate, EVALUATE's or
+#: addresses of functions, 0 until the engine writes them (`compile.calls`). RATES: what steps evaluate, EVALUATE's or
 #: one that stores only what they read; CALLS: its list, if any (`routines`); RUN: runs those of `mechanics.responses`
 EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RUN, CLOSE, MOVE, SPRINGS = ADDRESSES = _indices(11)
 
