@@ -72,5 +72,5 @@ class Numbers(CallList):
 
     @property
     def report(self) -> int:
-        """What the list reports of its evaluation."""
+        """Report of the evaluation, the first result of the list."""
         return int(self._report[0])
