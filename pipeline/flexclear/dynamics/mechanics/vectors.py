@@ -14,7 +14,7 @@ class Vector(tuple):
     """Three components."""
 
     __slots__ = ()
-    __array_ufunc__ = None  # NumPy's numbers leave products to the vector
+    __array_priority__ = 1.0  # NumPy's numbers leave products to the vector
 
     def __add__(self, b: Any) -> Any:
         return type(self)([x + y for x, y in zip(self, b, strict=True)])
