@@ -19,6 +19,8 @@ from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.code import Program
 from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, Branch, Loop, Symbol
@@ -98,10 +100,11 @@ _building: ContextVar[CallList | None] = ContextVar("building", default=None)
 
 @contextmanager
 def inline() -> Iterator[None]:
-    """Let routines be parts of what calls them during the context."""
+    """Let routines be parts of what calls them during the context; numbers may be infinite, as in compiled code."""
     token = _building.set(None)
     try:
-        yield
+        with np.errstate(all="ignore"):
+            yield
     finally:
         _building.reset(token)
 

@@ -44,7 +44,7 @@ class Numbers(CallList):
     def call(self, function: Callable, arguments: Any, into: Sequence[Cell] | None = None) -> Any:
         """Return the results of a call; without the first of several, if cells are given to store that."""
         given = [self._read(one) if type(one) in (Cell, Span) else one for one in leaves(arguments)]
-        with inline(), np.errstate(all="ignore"):
+        with inline():
             first, rest = parted(function(*rebuilt(arguments, iter(given))), into)
         for cell, value in zip(into or (), leaves(first), strict=True):
             self._arrays[cell.array][self._place(cell)] = value
