@@ -319,10 +319,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
         return make(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
-    engine = assemble(model, entry, METHODS[solver.integrator], mobility)
-    if not mobility.redundant:
-        engine.connect_record(progress)
-    return engine
+    return assemble(model, entry, METHODS[solver.integrator], mobility)
 
 
 def assemble(
