@@ -29,6 +29,7 @@ from flexclear.dynamics.model.plausibility import start_errors
 from flexclear.dynamics.run import bushings, joint_friction
 from flexclear.dynamics.run.evaluation import table_ranges
 from flexclear.dynamics.run.evaluation.specialised_code import (
+    MOST_MODES,
     SpecialisedCode,
     address,
     call_list,
@@ -163,9 +164,29 @@ class Engine:
                 describe = described_in_python(self.model, interpreted[int(self.h[m.PRESCRIBE])])
                 interpreted[id(describe)], self.h[m.DESCRIBE] = describe, id(describe)
             return
+        if self._by_python:
+            return self._call_python()
         given = self.model, self.h, self.specialised, self.selected.tobytes(), progress
         calls = call_list(*given, m.RECORD_CALLS)
         self.h[m.DESCRIBE], self.h[m.RECORD_CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
+
+    @property
+    def _by_python(self) -> bool:
+        """True when code of lists would cost more than the few states that are evaluated."""
+        return self.specialised.seldom and self.model.arrays.size(m.MOST_MODES) > MOST_MODES
+
+    def _call_python(self) -> None:
+        """Let Python evaluate the lists besides the steps'."""
+        if self.specialised.callbacks:
+            return
+        arrays = self.h, self.model.arrays.f, self.w, self.n
+        laws = function("prescribe", int(self.h[m.PRESCRIBE]))
+        describe = described_in_python(self.model, lambda *given: laws(*self._arrays(), given[-1]))
+        run, places = lists_in_python(self.model), [m.CLOSE, m.MOVE, m.SPRINGS]
+        for kinds, place_of, of in (("IFFIfii", m.DESCRIBE, describe), ("IFFIfiii", m.RUN, run)):
+            kept, self.h[place_of] = functions.callback(kinds, lambda *given, of=of: of(*arrays, *given[4:]) or 0)
+            self.specialised.callbacks.append(kept)
+        self.h[places] = 2 * PART * np.array(places, dtype=np.int64)
 
     @property
     def staged(self) -> bool:
@@ -199,7 +220,7 @@ class Engine:
             run = lists_in_python(self.model)
             interpreted[id(run)] = run
             self.h[m.RUN], self.h[places] = id(run), 2 * PART * np.array(places, dtype=np.int64)
-        elif not INTERPRETED:
+        elif not INTERPRETED and not self._by_python:
             for where in places:
                 calls = call_list(self.model, self.h, self.specialised, rows, progress, where)
                 self.h[m.RUN], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data
