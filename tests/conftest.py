@@ -31,27 +31,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: (item.path not in first, -tests[item.path]))
 
 
-_killed: list[str] = []
-
-
 @pytest.hookimpl(optionalhook=True)
-def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport, sched: Any) -> None:
-    """Run the tests of the first worker that the system kills once more; a second one is a failure.
+def pytest_handlecrashitem(sched: Any) -> None:
+    """Take the files that a worker killed by the system had finished off the list of files to run.
 
-    xdist hands them out again itself, together with all files that the worker had finished, and then waits for ever for
-    results of these.
+    xdist would hand them out again, and then wait for ever for their results.
     """
     for name in [name for name, tests in sched.workqueue.items() if all(tests.values())]:
         del sched.workqueue[name]
-    _killed.append(f"{crashitem}: {report.longrepr}")
-    if len(_killed) == 1:
-        report.outcome = "rerun"  # type: ignore[assignment]  # xdist's own word
-
-
-def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Name the tests over which workers were killed."""
-    for line in _killed:
-        terminalreporter.write_line(f"killed: {line}", red=True)
 
 
 @pytest.fixture(scope="session")

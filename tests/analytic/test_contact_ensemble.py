@@ -134,7 +134,7 @@ def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bi
 def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """The others end at their next pause; nobody waits for ever."""
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    proper, begun = trajectory._begin_closed, itertools.count()
+    proper, begun, threads = trajectory._begin_closed, itertools.count(), threading.active_count()
 
     def fails(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
         if next(begun) == 2:  # whichever thread it is in: one that is done with a member takes another
@@ -144,7 +144,7 @@ def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(trajectory, "_begin_closed", fails)
     with pytest.raises(SolverError, match="the third"):
         analyses.ensemble(scene(), {}, silent)
-    assert threading.active_count() == 1
+    assert threading.active_count() <= threads  # those of other tests may end meanwhile
 
 
 def test_of_concurrent_members_the_first_that_fails_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

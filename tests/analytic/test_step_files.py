@@ -44,7 +44,7 @@ def write(path: Path, draw: Draw) -> Path:
     """
     import gmsh
 
-    gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
+    step.start(gmsh)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
@@ -240,3 +240,12 @@ def test_a_shaft_belongs_to_a_hole_that_is_at_most_twice_as_wide(
         Round(hole, np.zeros(3), np.array([0.0, 0.0, 1.0]), r, 20.0) for r, hole in zip(radii, holes, strict=True)
     ]
     assert _fits(*rounds) == _fits(*rounds[::-1]) == fit
+
+
+@needs_gmsh
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems do not say which signals are ignored")
+def test_a_closed_pipe_stays_an_error_after_gmsh_has_run(tmp_path: Path) -> None:
+    """It ended the process without a word; the signal's number is 13."""
+    write(tmp_path / "plate.step", lambda kernel: kernel.addBox(0, 0, 0, 1, 1, 1))
+    (ignored,) = (x for x in Path("/proc/self/status").read_text().splitlines() if x.startswith("SigIgn"))
+    assert int(ignored.split()[1], 16) >> 12 & 1

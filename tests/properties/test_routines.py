@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.families import turning
 from benchmarks.families.growth import four_bars
 from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
@@ -349,6 +350,15 @@ WAYS: dict[str, tuple[str, Any]] = {
     "list": ("address", lambda *given, **more: 0),
     "straight code": ("SELECTIONS", 4),
 }
+
+
+def test_bodies_with_many_modes_step_by_kernels() -> None:
+    """Routines have a number per product of modes: 280 modes took more than 3 GB to compile, and did not end."""
+    body = turning.CASES["1-clamped-free"]()
+    one = engine_of(Scene.model_validate(turning.turning(body, 100.0)), {"rod": turning.reduced(body)}, silent)
+    assert one.model.arrays.size(m.MOST_MODES) > engine.MOST_MODES
+    one.settle(silent)
+    assert one.h[m.RATES] == one.h[m.EVALUATE] != 0
 
 
 def by_ways(scene: Scene) -> dict[str, Trajectory]:

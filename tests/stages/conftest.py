@@ -265,7 +265,7 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
         except SystemExit as end:
             ended = int(end.code or 0)
         printed = Printed(*capsys.readouterr())
-        assert ended == code, printed.err
+        assert ended == code, printed.out + printed.err
         return printed
 
     return run

@@ -11,6 +11,7 @@ from flexclear.artifacts.disk import checked
 from flexclear.artifacts.store import Record, Store
 from flexclear.commands import cache, why
 from flexclear.commands.__main__ import main
+from flexclear.dynamics.compile import files
 from flexclear.system import machine
 from tests.stages.conftest import Command
 
@@ -110,6 +111,25 @@ def test_kernels_of_another_build_are_counted_and_are_no_damage(store: Store, co
     assert "flexclear_old.py is damaged" not in reported
 
 
+def test_kernels_that_another_process_removes_meanwhile_are_no_damage(
+    store: Store, command: Command, monkeypatch: pytest.MonkeyPatch
+):
+    folder = store.root.parent / "kernels" / "abc"
+    folder.mkdir(parents=True)
+    source, sums = folder / "flexclear_old.py", folder / "flexclear_old.sum"
+    source.write_text("")
+    sums.write_bytes(checked({}))
+    compiled = files.compiled
+
+    def pruned(path: Path) -> bool:
+        sums.unlink(missing_ok=True)
+        return compiled(path)
+
+    monkeypatch.setattr(files, "compiled", pruned)
+    monkeypatch.setattr(files, "stored_by_another_build", lambda path: False)
+    assert "0 faults" in command("cache", "check").out
+
+
 def test_results_of_another_processor_are_reported_and_are_fresh():
     """Numbers differ by rounding under one key: the record names the instructions, `why` and `explain` report them."""
     here = machine.instruction_set()
@@ -141,8 +161,9 @@ def pendulum(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def shown(pendulum: Path, fresh: Path) -> Path:
-    """The run, in a copy of its results."""
+def shown(pendulum: Path, fresh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The run, in a copy of its results, with no kernels: those of other tests come and go meanwhile."""
+    monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "kernels"))
     shutil.copytree(pendulum, fresh)
     return fresh / "runs" / SCENE / "run.nc"
 

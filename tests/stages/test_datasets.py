@@ -177,9 +177,9 @@ def test_the_import_name_offers_all_functions_of_the_pipeline() -> None:
     assert all(getattr(fc, name) is getattr(fc.public, name) for name in fc.__all__)
 
 
-def test_functions_take_a_table_and_refuse_what_is_no_scene() -> None:
-    table = tomllib.loads(Path("scenes/checks/oscillator.toml").read_text(encoding="utf-8"))
-    known = fc.equilibrium("scenes/checks/oscillator.toml")
+def test_functions_take_a_table_and_refuse_what_is_no_scene(root: Path) -> None:
+    file = root / "scenes/checks/oscillator.toml"
+    table, known = tomllib.loads(file.read_text(encoding="utf-8")), fc.equilibrium(file)
     xr.testing.assert_identical(fc.equilibrium(table).position, known.position)
     for function in (fc.run, fc.show, fc.compare, fc.export, fc.open, fc.edited):
         with pytest.raises(InputError, match="is of type int"):

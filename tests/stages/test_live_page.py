@@ -18,6 +18,7 @@ from flexclear.scene.load import files_read
 from flexclear.stages import live as live_page
 from flexclear.system.errors import INTERRUPTED
 from tests.browser import Browser, browser, needs_browser
+from tests.stages.conftest import interruptible
 
 PENDULUM = """
 title = "A pendulum"
@@ -66,7 +67,8 @@ def live(folder: Path, *options: str) -> Iterator[Live]:
     (folder / "my.toml").write_text('extends = "base.toml"\n')
     (folder / "base.toml").write_text(PENDULUM)
     command = [sys.executable, "-m", "flexclear", "show", "my.toml", "--watch", *options]
-    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=folder, preexec_fn=interruptible, **pipes)
     try:
         assert process.stdout is not None
         yield Live(process, process.stdout.readline().partition(" ")[0], folder)

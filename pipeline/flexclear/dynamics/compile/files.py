@@ -75,6 +75,14 @@ def compiled(path: Path) -> bool:
     return noted is not None and noted == _digests(path)
 
 
+def damaged(path: Path) -> bool:
+    """Return True when the stored code of a file differs from its digests, which no other process is changing."""
+    if compiled(path):
+        return False
+    with file_lock(path, wait=True):
+        return path.with_suffix(".sum").is_file() and not compiled(path)
+
+
 def remove_code(path: Path) -> None:
     """Remove the compiled code of a file."""
     for suffix in (".sum", CODE):

@@ -48,6 +48,8 @@ MAKER: ContextVar[Callable[[Model, Mobility], Engine] | None] = ContextVar("make
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: selections of closure rows with specialised steps, per integration
 SELECTIONS = 4
+#: modes of a body up to which steps run on routines, whose code grows as their cube: 50 take seconds to compile
+MOST_MODES = 64
 #: without steps: no output times, no rows, no events
 NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 
@@ -204,7 +206,8 @@ class Engine:
             if specialised.place is not None and specialised.group is None and self.staged:
                 where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
                 specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
-            if rows not in specialised.rows and (len(specialised.rows) < SELECTIONS or changes):
+            few = len(specialised.rows) < SELECTIONS and self.model.arrays.size(m.MOST_MODES) <= MOST_MODES
+            if rows not in specialised.rows and (few or changes):
                 specialised.rows.append(rows)
             for met in specialised.rows:
                 if not address(self.model, self.h, specialised, met, progress=progress):

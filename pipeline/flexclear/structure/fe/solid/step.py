@@ -6,6 +6,8 @@ bytes.
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -64,6 +66,13 @@ class Solid:
     rounds: tuple[Round, ...]
 
 
+def start(gmsh: Any) -> None:
+    """Start Gmsh, which would let a closed pipe end this process from then on; Python makes an error of it."""
+    gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
+    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
+
+
 @contextmanager
 def opened(path: Path, where: str) -> Iterator[Any]:
     """Yield Gmsh with the solids of a STEP file; raise InputError, in words, without Gmsh or without any solid."""
@@ -74,7 +83,7 @@ def opened(path: Path, where: str) -> Iterator[Any]:
     except (ImportError, OSError) as error:
         reason = "" if isinstance(error, ImportError) else f" ({error})"
         raise InputError(where, f"STEP files need Gmsh{reason}", "pip install 'flexclear[cad]'") from None
-    gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
+    start(gmsh)
     try:
         for option, value in (("General.Terminal", 0), ("General.NumThreads", 1), ("General.AbortOnError", 2)):
             gmsh.option.setNumber(option, value)
