@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from flexclear.dynamics.run.evaluation.tree_factor import bias, mass_factor
 
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.mechanisms import Mechanism
@@ -21,7 +22,6 @@ from benchmarks.page import Columns, short, table
 from flexclear.artifacts.quantities import evaluate
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.run.evaluation import closure_rows
-from flexclear.dynamics.run.evaluation.tree_factor import bias, mass_factor
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import scene_of
 from flexclear.scene.schema import Scene
