@@ -27,7 +27,6 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Piece, Pieces
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.mechanics.trees import carried
 from flexclear.dynamics.mechanics.vectors import ZERO, Wrench
 from flexclear.dynamics.model.driving import coordinate_of
 from flexclear.dynamics.model.laws import NO_LAWS
@@ -185,7 +184,7 @@ def _rate(found: Matrices, engine: Engine, scene: Scene, actuator: str) -> np.nd
             return rates
     row = model.arrays.table(m.CLOSURES)[[closure.name for closure in model.closures].index(joint)]
     a, b = (found.mechanism.frames[row[site]] for site in ("site_a", "site_b"))
-    along = carried(*(b if coordinate.side else a).placed).R_WB.column(coordinate.axis)
+    along = found.motion(b if coordinate.side else a).R_WB.column(coordinate.axis)
     return found.moved_by(a, b, [Wrench(along, ZERO) if coordinate.turning else Wrench(ZERO, along)])[0]
 
 

@@ -16,7 +16,7 @@ from flexclear.dynamics.mechanics.mechanism import Frame, Link, Modes
 from flexclear.dynamics.mechanics.of_topology import mechanism_of
 from flexclear.dynamics.mechanics.record import moving_parts
 from flexclear.dynamics.mechanics.tables import Tables
-from flexclear.dynamics.mechanics.trees import carried, on_both
+from flexclear.dynamics.mechanics.trees import Motion, on_body
 from flexclear.dynamics.mechanics.vectors import ZERO, Vector, Wrench
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.routines.numbers import Numbers
@@ -91,12 +91,17 @@ class Matrices:
         """Rates of all rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
         return self.dense({number: jacobian(ends, driven=True) for number, ends in self.loops.ends.items()})
 
+    def motion(self, frame: Frame) -> Motion:
+        """Return the motion of a frame."""
+        with self.calls.building():
+            return on_body(*frame.placed)
+
     def moved_by(self, a: Frame, b: Frame, wrenches: Iterable[Wrench]) -> np.ndarray:
         """Return motions between two frames, which wrenches on b, about its origin, choose; per speed, (.., speeds)."""
-        ends, B = (a.placed, b.placed), carried(*b.placed)
-        on_a, on_b = zip(*(on_both(ends, B, wrench) for wrench in wrenches), strict=True)
-        found = np.zeros((len(on_a), self._shape[1]))
-        for moved, block in jacobian([(a, on_a), (b, on_b)], driven=True).items():
+        p, ways = self.motion(b).p_WB, list(wrenches)
+        on_a, on_b = ([wrench.about(p - one.carrier.motion.p_WB) for wrench in ways] for one in (a, b))
+        found = np.zeros((len(ways), self._shape[1]))
+        for moved, block in jacobian([(a, [wrench * -1.0 for wrench in on_a]), (b, on_b)], driven=True).items():
             if block:
                 found[:, self._first[moved] :][:, : len(block)] = np.transpose(block)
         return found
