@@ -27,7 +27,7 @@ ACROSS = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
 
 
 class Evaluated(NamedTuple):
-    """An evaluation, with what `tree_factor` reads of an engine.
+    """An evaluation, with what `matrices` reads of an engine.
 
     rates: of the state.  drives: forces of the drives.  report: n[EVALUATION].  lengths: of what is in w.
     """
@@ -46,6 +46,10 @@ class Evaluated(NamedTuple):
     @property
     def w(self) -> np.ndarray:
         return self.space.w
+
+    @property
+    def n(self) -> np.ndarray:
+        return self.space.n
 
     def stretch(self, index: int) -> np.ndarray:
         return self.w[self.h[index] :][: self.lengths[index]]

@@ -17,8 +17,8 @@ from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.matrices import Matrices, holding_forces
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.specialise.topology import topology_of
@@ -84,7 +84,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
 
 def full(found: Evaluated) -> np.ndarray:
     """Factor of the mass matrix in full."""
-    return mass_factor(cast("Engine", found))
+    return Matrices(cast("Engine", found)).factor
 
 
 @cache
@@ -125,7 +125,7 @@ def mass_by_energy(found: Evaluated) -> np.ndarray:
 
 def drives_bias(found: Evaluated) -> np.ndarray:
     """Forces of the drives without free accelerations: wrenches along their columns."""
-    moments, pushes = carried_wrenches(cast("Engine", found))
+    moments, pushes = np.split(holding_forces(cast("Engine", found))[1], 2, axis=1)
     columns, numbering = found.table(m.COLUMNS), found.model.numbering
     made = np.zeros(len(found.drives))
     for i, coordinates in enumerate(numbering.coordinates):
@@ -155,11 +155,12 @@ def test_bodies_have_the_mass_that_their_energy_says(name: str) -> None:
     L = modes @ L
     assert apart(L @ L.T, M[:nv, :nv]) < 1e-12  # differences of energies in extended precision
     selected = selection.selected_indices(model, found.h)
-    J, spread = (selection.dense_rows(model, found.h, found.stretch(at)) for at in (m.JACOBIAN, m.SPREAD))
+    by_routines, loops = (one := Matrices(cast("Engine", found))), one.loops
+    J, spread = by_routines.jacobian[:, :nv], by_routines.dense({k: by.V for k, by in loops.found.items()})[:, :nv]
     assert apart(L @ spread.T, modes @ J.T) < ROUNDING
     J = J @ modes.T
     full_matrix = np.block([[M[:nv, :nv], J.T], [J, np.zeros((len(J),) * 2)]])
-    forces = np.concatenate([-modes @ bias(cast("Engine", found)), found.stretch(m.GAMMA)[selected]])
+    forces = np.concatenate([-modes @ holding_forces(cast("Engine", found))[0], found.stretch(m.GAMMA)[selected]])
     solved = np.linalg.solve(full_matrix, forces)[:nv]
     assert apart(found.rates[model.speeds], solved) < ROUNDING
     if not len(J):

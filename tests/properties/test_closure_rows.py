@@ -10,7 +10,7 @@ from flexclear.dynamics.model import selection, tree
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.tree_factor import mass_factor
+from flexclear.dynamics.run.evaluation.matrices import Matrices
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE
@@ -47,7 +47,7 @@ def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
     assert found.report == m.OK
     assert model.arrays.table(m.CLOSURES, h)["n_kept"].tolist() == rows
     J, S = (selection.dense_rows(model, h, w[h[place] :][: h[m.JACOBIAN_SIZE]]) for place in (m.JACOBIAN, m.SPREAD))
-    L = mass_factor(cast("Engine", found))
+    L = Matrices(cast("Engine", found)).factor
     C = dense_factor(model.arrays.table(m.CLOSURE_ENVELOPE, h)[: len(J)], w[h[m.SCHUR] :])
     bias = w[h[m.GAMMA] :][selection.selected_indices(model, h)]
     accelerations = w[h[m.DU] :][: model.nv]

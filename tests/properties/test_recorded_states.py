@@ -110,7 +110,7 @@ class Looks:
 
     def __init__(self, found: Evaluated) -> None:
         self.found, self.model, self.h = found, found.model, found.h
-        self._describe = uncompiled(self.model, analyse(self.model)).entry.kernels.describe  # type: ignore[attr-defined]
+        self._describe = uncompiled(self.model, analyse(self.model)).entry.kernels.evaluate  # type: ignore[attr-defined]
         y = int(self.h[m.Y])
         self.state = found.w[y : y + self.model.ny].astype(float)
         self.here = self.at(0.0, np.zeros_like(self.state))
@@ -120,7 +120,7 @@ class Looks:
         w, n, h = self.found.w.astype(float), self.found.space.n.copy(), self.h
         w[h[m.Y] : h[m.Y] + self.model.ny] = self.state + later * rates
         self._describe(h, self.model.arrays.f, w, n, 0.1 + later, int(h[m.Y]), int(h[m.SLOPES]))
-        assert (n[m.EVALUATION], n[m.ABRIDGED]) == (m.OK, 1)
+        assert (n[m.EVALUATION], n[m.ABRIDGED]) == (m.OK, 0)
         return Look(self.model, h, w)
 
     def rate(self, read: Callable[[Look], np.ndarray], step: float = STEP) -> np.ndarray:

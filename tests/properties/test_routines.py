@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.families import turning
 from benchmarks.families.growth import four_bars
 from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
@@ -24,8 +23,7 @@ from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.routines.store import load
-from flexclear.dynamics.run.evaluation import engine, specialised_code
-from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation import engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
@@ -337,52 +335,35 @@ def inertia_parts(random: np.random.Generator) -> tuple[Symmetric, Matrix, Symme
 
 
 # Steps ----------------------------------------------------------------------------------------------------------------
-def long(scene: Scene) -> Engine:
-    """The engine of a scene as if it were too long for specialised code."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(specialised_code, "INTERPRETED", True)
-        return engine_of(scene, {}, silent)
-
-
 #: ways of steps, and what makes the engine take them
 WAYS: dict[str, tuple[str, Any]] = {
-    "kernels": ("INTERPRETED", True),
     "list": ("address", lambda *given, **more: 0),
+    "list of a fifth selection": ("SELECTIONS", 0),
     "straight code": ("SELECTIONS", 4),
 }
 
 
-def test_bodies_with_many_modes_step_by_kernels() -> None:
-    """Routines have a number per product of modes: 280 modes took more than 3 GB to compile, and did not end."""
-    body = turning.CASES["1-clamped-free"]()
-    one = engine_of(Scene.model_validate(turning.turning(body, 100.0)), {"rod": turning.reduced(body)}, silent)
-    assert one.model.arrays.size(m.MOST_MODES) > engine.MOST_MODES
-    one.settle(silent)
-    assert one.h[m.RATES] == one.h[m.EVALUATE] != 0
-
-
 def by_ways(scene: Scene) -> dict[str, Trajectory]:
     """Runs of a scene whose steps evaluate in each way."""
-    engines, runs = {way: long(scene) for way in WAYS}, {}
+    engines, runs = {way: engine_of(scene, {}, silent) for way in WAYS}, {}
     for way, one in engines.items():
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(engine, *WAYS[way])
-            assert not one.has_specialised_code
             runs[way] = integrate(one, consistent_start(one), silent)
-        assert bool(one.h[m.CALLS]) == (way == "list")
-        assert (one.h[m.RATES] == one.h[m.EVALUATE]) == (way == "kernels")
+        assert bool(one.h[m.CALLS]) == (way != "straight code")
+        assert one.h[m.RATES] != one.h[m.EVALUATE]
     return runs
 
 
 def test_steps_of_long_mechanisms_run_on_routines() -> None:
     runs = by_ways(four_bars(3, 0.3))
-    assert all(apart(run.state, runs["kernels"].state) < 1e-9 for run in runs.values())
+    assert all(apart(run.state, runs["straight code"].state) < 1e-9 for run in runs.values())
 
 
 def test_a_list_belongs_to_the_rows_that_are_selected(monkeypatch: pytest.MonkeyPatch) -> None:
     """With rows that depend on others the same pose is singular."""
     monkeypatch.setattr(engine, *WAYS["list"])
-    one = long(load_scene(TREE / "scenes/checks/four_bars_2.toml"))
+    one = engine_of(load_scene(TREE / "scenes/checks/four_bars_2.toml"), {}, silent)
     y, lists, reports = consistent_start(one), [], []
     kept = one.selected.copy()
     for rows in (kept, np.ones_like(kept), kept):

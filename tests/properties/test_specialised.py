@@ -24,7 +24,7 @@ from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.run import engine_of, observe_run
+from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.sensitivity.dataset import sensitivities
 from flexclear.dynamics.specialise import dual
@@ -149,47 +149,24 @@ def engine(integrator: str = "dop853") -> Engine:
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that reads more of some evaluations than the rates
-def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stroke with impacts, as exactly as its own tolerance tells, with equal events; so for what is too long."""
-    alone = engine(integrator)
-    with monkeypatch.context() as patch:
-        patch.setattr(specialised_code, "INTERPRETED", True)
-        general = engine(integrator)
-    assert (alone.has_specialised_code, general.has_specialised_code) == (True, False)
-    straight, kernels = (integrate(one, consistent_start(one), silent) for one in (alone, general))
-    assert alone.h[m.RATES] != alone.h[m.EVALUATE]
-    assert straight.events["kind"].tolist() == kernels.events["kind"].tolist()
-    # before the first impact, whose instants differ by rounding; each of those that follow magnifies it
-    first = float(kernels.events["time"][0]) - 1e-9
-    before = [run.state[run.time <= first][:, : alone.model.nq] for run in (kernels, straight)]
-    assert np.abs(before[0] - before[1]).max() < 1e-9
-    for k in (0, len(kernels.rows) // 2):
-        rates = []
-        for one, address in ((general, m.EVALUATE), (alone, m.EVALUATE), (alone, m.RATES)):
-            one.select_pieces_after(kernels.time[k])
-            one.h[m.EVALUATE], before_it = one.h[address], one.h[m.EVALUATE]
-            rates.append(closure_rows.evaluate(one, kernels.state[k], kernels.time[k]))
-            one.h[m.EVALUATE] = before_it
-        assert all(apart(alone.model, rates[0], other) < ROUNDING for other in rates[1:])
-    seen = [observe_run(one, kernels) for one in (general, alone)]
-    for name in ("link_wrenches", "closure_wrenches", "drive_force", "energy"):
-        a, b = (getattr(one, name) for one in seen)
-        fields = a.dtype.names or [...]
-        assert all(np.abs(a[k] - b[k]).max() <= 1e-6 * np.abs(a[k]).max() for k in fields), name
+def test_compiled_steps_evaluate_as_the_record_does(integrator: str) -> None:
+    """Straight code of the steps, and the list that stores all, at states of a stroke with impacts."""
+    one = engine(integrator)
+    run = integrate(one, consistent_start(one), silent)
+    assert one.h[m.RATES] != one.h[m.EVALUATE]
+    for k in (0, len(run.rows) // 2):
+        one.select_pieces_after(run.time[k])
+        rates, before = [closure_rows.evaluate(one, run.state[k], run.time[k])], one.h[m.EVALUATE]
+        assert not one.n[m.ABRIDGED]
+        one.h[m.EVALUATE] = one.h[m.RATES]
+        rates.append(closure_rows.evaluate(one, run.state[k], run.time[k]))
+        one.h[m.EVALUATE] = before
+        assert one.n[m.ABRIDGED]
+        assert apart(one.model, *rates) < ROUNDING
 
 
-def test_friction_of_ideal_joints_is_iterated_by_the_kernels_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, rates = load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), []
-    for general in (False, True):
-        monkeypatch.setattr(specialised_code, "INTERPRETED", general)
-        one = engine_of(scene, {}, silent)
-        assert one.has_specialised_code == (not general)
-        rates.append(closure_rows.evaluate(one, consistent_start(one), one.start))
-    assert apart(one.model, *rates) < ROUNDING
-
-
-def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tracing, "LONGEST", 10)
+def test_what_is_too_long_runs_a_list_and_is_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tracing, "LONGEST_STRAIGHT", 10)
     monkeypatch.setattr(specialised_code, "_known", {})
     scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
     with monkeypatch.context() as patch, TemporaryDirectory() as folder:
@@ -198,8 +175,8 @@ def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeyp
         patch.setattr(files, "loaded", {})
         patch.setattr(functions, "loaded", files.loaded)
         one = engine_of(scene, {}, silent)
-        assert not one.has_specialised_code
         assert integrate(one, consistent_start(one), silent).time[-1] == 0.01
+        assert one.h[m.CALLS]
         made = sensitivities(scene, {}, silent, ["hinge.velocity.final"], ["load.gravity.acceleration.1"])
         # as long as it hangs still, its rate grows with gravity
         rate = made["hinge.velocity.final"].item() * -9.81
@@ -214,8 +191,10 @@ def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
     fewer = kept.copy()
     fewer[-1] = False
     one.keep(fewer)
+    one.connect()
     assert one.h[m.RATES] == one.h[m.EVALUATE]
     one.keep(kept)
+    one.connect()
     assert one.h[m.RATES] == straight
 
 

@@ -163,11 +163,11 @@ class Room:
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
-#: addresses of functions, zero until the engine writes them (`compile.calls`). RATES: what steps evaluate, EVALUATE's
-#: or one that stores only what they read; CALLS: its list, if any (`routines`); DESCRIBE, RECORD_CALLS: of all that the
-#: record has; RUN: runs those of `mechanics.responses`
-EVALUATE, PROJECT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS, RECORD_CALLS, *_ = ADDRESSES = _indices(12)
-RUN, CLOSE, MOVE, SPRINGS = ADDRESSES[8:]
+#: addresses of functions, zero until the engine writes them (`compile.calls`). EVALUATE: stores all that the record has
+#: (`mechanics.record`), by the list RECORD_CALLS; RATES: what steps evaluate, that or one which stores only what they
+#: read; CALLS: its list, if any; RUN: runs those of `mechanics.responses`
+EVALUATE, PROJECT, PRESCRIBE, RESOLVE, RATES, CALLS, RECORD_CALLS, *_ = ADDRESSES = _indices(11)
+RUN, CLOSE, MOVE, SPRINGS = ADDRESSES[7:]
 
 # Topology in h -------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;

@@ -66,7 +66,7 @@ if INTERPRETED:  # for debugging: the same calls between functions of Python, wh
 
 @kernel
 def evaluate(h, f, w, n, t, y, dy):
-    """Evaluate the right-hand side: `equations.right_hand_side`."""
+    """Evaluate the right-hand side, and store all that the record has of it: `mechanics.record`."""
     call(h[m.EVALUATE], (h, f, w, n, float(t), y, dy))
 
 
@@ -74,12 +74,6 @@ def evaluate(h, f, w, n, t, y, dy):
 def laws(h, f, w, n, t):
     """Evaluate the laws of time: `equations.prescribed_motion`."""
     call(h[m.PRESCRIBE], (h, f, w, n, float(t)))
-
-
-@kernel
-def describe(h, f, w, n, t, y, dy):
-    """Evaluate the right-hand side, and store what the record has of it: `mechanics.record`."""
-    call(h[m.DESCRIBE], (h, f, w, n, float(t), y, dy))
 
 
 @kernel

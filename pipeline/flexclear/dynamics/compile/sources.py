@@ -146,7 +146,7 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
 
 
 def kernels(parts: Parts) -> dict[str, str]:
-    """Return the source of the generic right-hand side, for a topology without own code."""
+    """Return the source of the right-hand side by kernels, with which tests compare routines."""
     return {"evaluate": _right_hand_side(parts).calling("evaluate", "t, y, dy", _formulas(parts))}
 
 
@@ -219,15 +219,13 @@ def _rows(topology: Topology) -> str:
 
 
 def for_python(parts: Parts) -> Iterator[tuple[str, str, str]]:
-    """Yield name, kernel and source of all with which Python evaluates and observes a state, without compilation.
+    """Yield name, kernel and source of all kernels with which Python observes a state, without compilation.
 
     They call those before them as the names of `calls`.
     """
-    formulas = _formulas(parts)
-    files = {"laws": _laws(parts), "evaluate": _right_hand_side(parts)}
-    files |= {"project": _projection(parts)} if parts.closures else {}
+    files = {"laws": _laws(parts)} | ({"project": _projection(parts)} if parts.closures else {})
     for name, file in (files | {"observe": _observation(parts)}).items():
-        yield name, file.kernel, file.text("", formulas if name == "evaluate" else "")
+        yield name, file.kernel, file.text("")
 
 
 def _equations(parts: Parts) -> Composition:
@@ -250,7 +248,7 @@ def _projection(parts: Parts) -> Composition:
 def _observation(parts: Parts) -> Composition:
     """Return a file for the record of states."""
     file = Composition(parts, "record", "observation", (f"{DYNAMICS}.equations.observation", "make_observation"))
-    file.given = {"describe": "calls.describe", "project": file.projection}
+    file.given = {"evaluate": "calls.evaluate", "project": file.projection}
     return file
 
 

@@ -183,12 +183,12 @@ def foresee(d, rows, r, state, closed, states):
     return most > 0.0
 
 
-def make_observation(describe: Callable, project: Callable) -> Callable:
+def make_observation(evaluate: Callable, project: Callable) -> Callable:
     """Build the kernel observe(h, f, w, n, rows, pieces, tolerance, out), which fills the blocks of `room`.
 
     With a tolerance of AS_RECORDED only the frames of links are stored.
 
-    describe: the right-hand side, which stores what the record has (`mechanics.record`).  project: as the stepper
+    evaluate: the right-hand side, which stores what the record has (`mechanics.record`).  project: as the stepper
     calls it.
     """
 
@@ -249,10 +249,10 @@ def make_observation(describe: Callable, project: Callable) -> Callable:
 
     @kernel
     def close(d, t, tolerance):
-        """Close the loops of the state in Y, which has been described, to `tolerance`, and describe it again."""
+        """Close the loops of the state in Y, which has been evaluated, to `tolerance`, and evaluate it again."""
         moved = project(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes, tolerance) if d.evaluation == m.OK else 0
         if moved > 0:
-            describe(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes)
+            evaluate(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes)
         if moved < 0:
             d.evaluation = m.NOT_CLOSED
         if d.evaluation == m.OK and d.n_kept_rows > 0 and d.last_pivot < BLIND:
@@ -272,7 +272,7 @@ def make_observation(describe: Callable, project: Callable) -> Callable:
             while True:
                 state = select(d, rows[r], pieces[r])
                 foreseen = foreseen and foresee(d, rows, r, state, out, states)
-                describe(h, f, w, n, rows[r, 0], d.at_y, d.at_slopes)
+                evaluate(h, f, w, n, rows[r, 0], d.at_y, d.at_slopes)
                 if tolerance == AS_RECORDED:
                     break
                 if not foreseen or (d.evaluation == m.OK and open_by(d) <= tolerance):

@@ -19,15 +19,12 @@ import scipy.linalg
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.linear.bench import (
     Bench,
-    acting_wrenches,
     balance,
-    balancing_moment,
     displacement_map,
     set_drives,
     state,
 )
 from flexclear.dynamics.model.interface_basis import modes_of
-from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.specialise import dual
 from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.system.errors import SolverError
@@ -44,7 +41,7 @@ class Tangent:
 
     q: positions.  Z: speeds per free motion, shape (nv, mobility).  moves: positions per coordinate, (nq, nv).
     bias, mass, multipliers: as in `bench.Balance`; multipliers balance `bias` best.
-    forces: size of the balancing forces (`bench.balancing_moment`).
+    forces: size of the balancing forces (`bench.Balance.moment`).
     """
 
     q: np.ndarray
@@ -68,7 +65,7 @@ class Tangent:
 
 def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     """Return the free motions at closed positions q; raise SolverError at deformations beyond any real pose."""
-    b, forces = balance(bench, q), balancing_moment(bench)
+    b = balance(bench, q)
     try:
         Z, lower, spread = free_motions(b.mass, b.jacobian)
     except np.linalg.LinAlgError:
@@ -79,7 +76,7 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     multipliers = np.linalg.lstsq(spread.T, load, rcond=REDUNDANT_ROW)[0] if len(spread) else np.zeros(0)
     moves = displacement_map(bench, q)
     redundant = len(b.jacobian) - (len(b.bias) - Z.shape[1]) + bench.engine.mobility.redundant
-    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, redundant, forces)
+    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, redundant, b.moment)
 
 
 def free_motions(mass: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -118,14 +115,12 @@ def _forces_by_turning(bench: Bench, at: Tangent) -> float:
     """Return the contribution of the drives' motion to the balancing forces, per speed of the fastest; 0 at rest."""
     if not bench.fastest:
         return 0.0
-    moving, drives = acting_wrenches(bench), bench.drives
+    moving, drives = balance(bench, at.q).acting, bench.drives
     try:
         set_drives(bench, drives * [1.0, 0.0])
-        balance(bench, at.q)
-        resting = acting_wrenches(bench)
+        resting = balance(bench, at.q).acting
     finally:
         set_drives(bench, drives)
-    balance(bench, at.q)  # later code reads the moving state
     return float(np.max(np.abs(moving - resting), initial=0.0)) / bench.fastest
 
 
@@ -169,7 +164,8 @@ def changed(
 
     engine, model, h = bench.engine, bench.model, bench.engine.h
     y = state(bench, q)
-    closure_rows.evaluate(engine, y, bench.time)  # stores the laws of time in the work space
+    engine.view(m.Y)[:] = y
+    engine.evaluate_laws(bench.time)
     w, topology = list(engine.w), topology_of(model.arrays, h)
     w[h[m.Y] : h[m.Y] + len(y)] = dual.seeded(y, directions)
     if laws is not None:

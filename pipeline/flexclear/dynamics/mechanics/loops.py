@@ -122,14 +122,14 @@ def passed_inwards(
     return found, gamma, S
 
 
-def jacobian(ends: Ends) -> dict[Link | Modes, c.Rows]:
-    """Return J^T of rows by what they move, per coordinate or shape a number for each row."""
+def jacobian(ends: Ends, *, driven: bool = False) -> dict[Link | Modes, c.Rows]:
+    """Return J^T of rows by what they move, per coordinate or shape a number for each row; driven: with driven ones."""
     found = dict[Link | Modes, c.Rows]()
 
     def passed(link: Link, wrenches: c.Wrenches, loads: list[tuple[c.Wrenches, Columns]]) -> c.Wrenches:
         if modes := link.modes:
             found[modes] = c.along([columns for _, columns in loads], [given for given, _ in loads])
-        if not link.driven:
+        if driven or not link.driven:
             found[link] = c.along([link.step.S], [wrenches])
         return c.inwards(link.step, wrenches) if link.on_link else []
 

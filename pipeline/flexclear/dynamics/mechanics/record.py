@@ -27,7 +27,7 @@ def describe(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallList
             of_loops(tables, mechanism, loops, calls)
 
 
-def _moving(tables: Tables, mechanism: Mechanism) -> Iterator[tuple[Link | Modes, Any]]:
+def moving_parts(tables: Tables, mechanism: Mechanism) -> Iterator[tuple[Link | Modes, Any]]:
     """Yield all links and modes with their rows of LINKS and FLEXES: the first position and the first speed."""
     bodies = {int(row["link"]): row for row in tables.table(m.FLEXES)}
     for i, (link, row) in enumerate(zip(mechanism.links, tables.table(m.LINKS)[1:], strict=True), start=1):
@@ -38,7 +38,7 @@ def _moving(tables: Tables, mechanism: Mechanism) -> Iterator[tuple[Link | Modes
 
 def _coordinates(tables: Tables, mechanism: Mechanism, calls: CallList) -> None:
     """Store all positions and speeds, and the accelerations of prescribed coordinates."""
-    for moved, row in _moving(tables, mechanism):
+    for moved, row in moving_parts(tables, mechanism):
         x, u, du = (moved.q, moved.u, ()) if isinstance(moved, Modes) else moved.coordinates
         known = du if isinstance(moved, Link) and moved.driven else ()
         for stretch, first, values in ((m.X, "q0", x), (m.U, "c0", u), (m.DU, "c0", known)):
@@ -80,7 +80,7 @@ def _wrenches(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallLis
 
 def _jacobian(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallList) -> None:
     """Store the Jacobian of the rows that are solved for; three rows are together."""
-    first = {moved: int(row["c0"]) for moved, row in _moving(tables, mechanism)}
+    first = {moved: int(row["c0"]) for moved, row in moving_parts(tables, mechanism)}
     closures, support = tables.table(m.CLOSURES), tables.table(m.SUPPORT)["coordinate"].tolist()
     for number, ends in loops.ends.items():
         one = closures[number]

@@ -75,7 +75,7 @@ def interpreter_text(place: int | None) -> str:
     builder.cbranch(builder.icmp_signed("<", following, count), loop, after)
     builder.position_at_end(after)
     status = builder.fptosi(builder.load(results), _WORD)
-    reports = {m.EVALUATION: status} | ({m.STATE: y, m.ABRIDGED: _WORD(1)} if place else {})
+    reports = {m.EVALUATION: status} | ({m.STATE: y, m.ABRIDGED: _WORD(int(place == m.CALLS))} if place else {})
     for index, value in reports.items():
         builder.store(value, builder.gep(n, [_WORD(index)]))
     builder.ret(_WORD(0))

@@ -1,9 +1,7 @@
 """Right-hand side of one topology as specialised code: no tables, no loops, only registers and the stack as storage.
 
-Each topology has two versions. The steps call straight code of routines (`mechanics.of_topology`), which stores only
-what they read (`mechanics.evaluation.evaluated`); n[ABRIDGED] reports that. LLVM optimises this version. The other one
-is that of kernels and stores all results of an evaluation. It is called some hundreds of times in a run, and LLVM
-assembles it without optimisation, in a tenth of the time.
+The steps call straight code of routines (`mechanics.of_topology`), which stores only what they read
+(`mechanics.evaluation.evaluated`); n[ABRIDGED] reports that.
 """
 
 from __future__ import annotations

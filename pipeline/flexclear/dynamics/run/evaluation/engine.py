@@ -14,7 +14,6 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
 from flexclear.dynamics.compile.files import PART, interpreted
 from flexclear.dynamics.compile.functions import function, place
-from flexclear.dynamics.compile.sources import WHOLE
 from flexclear.dynamics.effects import scheme_of
 from flexclear.dynamics.equations.prescribed_motion import SHORTEST
 from flexclear.dynamics.integrate import METHODS
@@ -29,12 +28,11 @@ from flexclear.dynamics.model.plausibility import start_errors
 from flexclear.dynamics.run import bushings, joint_friction
 from flexclear.dynamics.run.evaluation import table_ranges
 from flexclear.dynamics.run.evaluation.specialised_code import (
-    MOST_MODES,
     SpecialisedCode,
     address,
     call_list,
-    described_in_python,
     equations,
+    evaluated_in_python,
     lists_in_python,
     made,
 )
@@ -46,10 +44,8 @@ from flexclear.system.progress import Progress, silent
 MAKER: ContextVar[Callable[[Model, Mobility], Engine] | None] = ContextVar("maker", default=None)
 #: of effects: why a run stopped, in words
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
-#: selections of closure rows with specialised steps, per integration
+#: first selections of closure rows of an integration, whose steps are specialised; those of others run lists
 SELECTIONS = 4
-#: modes of a body up to which steps run on routines, whose code grows as their cube: 50 take seconds to compile
-MOST_MODES = 64
 #: without steps: no output times, no rows, no events
 NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 
@@ -75,11 +71,6 @@ class Engine:
     start: float
     end: float
     specialised: SpecialisedCode
-
-    @property
-    def has_specialised_code(self) -> bool:
-        """True when evaluations use code specialised for the topology."""
-        return "evaluate" not in self.entry.addresses
 
     @cached_property
     def breaks(self) -> np.ndarray:
@@ -145,55 +136,47 @@ class Engine:
             self.selected[:] = rows
             selection.write(self.model, self.h, self.selected)
         self.view(m.ROW_SCALE)[: len(rows)] = 0.0
-        self.connect()
+        self.h[m.EVALUATE] = 0
 
-    def connect(self) -> None:
-        """Connect the functions for the selected rows: specialised code or routines for the steps where they exist."""
+    def connect(self, progress: Progress = silent) -> None:
+        """Connect functions for the selected rows: lists of calls, and for steps specialised code where it exists."""
         rows, known = self.selected.tobytes(), self.specialised
-        alone = rows in known.rows
-        if self.has_specialised_code:
-            self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
-        self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
-        if not self.h[m.RATES]:
-            calls = call_list(self.model, self.h, known, rows)
-            self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
-        self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
-
-    def connect_record(self, progress: Progress) -> None:
-        """Connect the list of calls that evaluates what the record has, for the selected rows."""
         if INTERPRETED:
-            if not self.h[m.DESCRIBE]:
-                describe = described_in_python(self.model, interpreted[int(self.h[m.PRESCRIBE])])
-                interpreted[id(describe)], self.h[m.DESCRIBE] = describe, id(describe)
-            return
-        if self._by_python:
-            return self._call_python()
-        given = self.model, self.h, self.specialised, self.selected.tobytes(), progress
-        calls = call_list(*given, m.RECORD_CALLS)
-        self.h[m.DESCRIBE], self.h[m.RECORD_CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
+            return self._connect_python()
+        for where, at in self._lists.items():
+            calls = call_list(self.model, self.h, known, rows, progress, where)
+            self.h[at], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data
+        self.h[m.RATES], met = self.h[m.EVALUATE], rows in known.rows
+        if met and not (self._specialises(rows) and address(self.model, self.h, known, rows, progress)):
+            calls = call_list(self.model, self.h, known, rows, progress)
+            self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
+        elif met:
+            self.h[m.RATES] = known.addresses[rows]
+        self.n[m.TOGETHER] = bool(met and known.group and known.group.rows == rows)
+
+    def _specialises(self, rows: bytes) -> bool:
+        """Return True when steps for closure rows that the integration has met use specialised code, if that exists."""
+        return bool(self.specialised.rows.index(rows) < SELECTIONS or self.h[m.N_CHANGES])
 
     @property
-    def _by_python(self) -> bool:
-        """True when code of lists would cost more than the few states that are evaluated."""
-        return self.specialised.seldom and self.model.arrays.size(m.MOST_MODES) > MOST_MODES
+    def _lists(self) -> dict[int, int]:
+        """Lists that compiled functions run besides the steps': their places in h, and those of their interpreters."""
+        size, method = self.model.arrays.size, self.method
+        used = {m.CLOSE: size(m.N_CLOSURES), m.MOVE: method.traits.retracts, m.SPRINGS: method.room.oscillations}
+        return {m.RECORD_CALLS: m.EVALUATE, **{where: m.RUN for where, needed in used.items() if needed}}
 
-    def _call_python(self) -> None:
-        """Let Python evaluate the lists besides the steps'."""
-        if self.specialised.callbacks:
-            return
-        arrays = self.h, self.model.arrays.f, self.w, self.n
-        laws = function("prescribe", int(self.h[m.PRESCRIBE]))
-        describe = described_in_python(self.model, lambda *given: laws(*self._arrays(), given[-1]))
-        run, places = lists_in_python(self.model), [m.CLOSE, m.MOVE, m.SPRINGS]
-        for kinds, place_of, of in (("IFFIfii", m.DESCRIBE, describe), ("IFFIfiii", m.RUN, run)):
-            kept, self.h[place_of] = functions.callback(kinds, lambda *given, of=of: of(*arrays, *given[4:]) or 0)
-            self.specialised.callbacks.append(kept)
+    def _connect_python(self) -> None:
+        """Connect functions of Python in place of compiled lists."""
+        laws, places = interpreted[int(self.h[m.PRESCRIBE])], list(self._lists)[1:]
+        made = {where: evaluated_in_python(self.model, laws, where) for where in (m.RECORD_CALLS, m.CALLS)}
+        for at, one in zip((m.EVALUATE, m.RATES, m.RUN), (*made.values(), lists_in_python(self.model)), strict=True):
+            interpreted[id(one)], self.h[at] = one, id(one)
         self.h[places] = 2 * PART * np.array(places, dtype=np.int64)
 
     @property
     def staged(self) -> bool:
         """True when the engine can step together with others."""
-        return bool(self.method.staged and self.has_specialised_code)
+        return bool(self.method.staged and not INTERPRETED)
 
     def settle(self, progress: Progress) -> None:
         """Let further steps use specialised code or routines for the selected rows, at a place together with others.
@@ -201,44 +184,23 @@ class Engine:
         The selections that the integration has met decide, so an interrupted integration continues with the same code
         as an uninterrupted one.
         """
-        specialised, rows, changes = self.specialised, self.selected.tobytes(), self.h[m.N_CHANGES]
+        specialised, rows = self.specialised, self.selected.tobytes()
         if not INTERPRETED:
             if specialised.place is not None and specialised.group is None and self.staged:
                 where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
                 specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
-            few = len(specialised.rows) < SELECTIONS and self.model.arrays.size(m.MOST_MODES) <= MOST_MODES
-            if rows not in specialised.rows and (few or changes):
+            if rows not in specialised.rows:
                 specialised.rows.append(rows)
-            for met in specialised.rows:
-                if not address(self.model, self.h, specialised, met, progress=progress):
-                    call_list(self.model, self.h, specialised, met, progress)
-        self.connect()
-
-    def _connect_lists(self, progress: Progress = silent) -> None:
-        """Connect the lists, besides the steps', that compiled functions run for the selected rows."""
-        size, traits = self.model.arrays.size, self.method.traits
-        used = {m.CLOSE: size(m.N_CLOSURES), m.MOVE: traits.retracts, m.SPRINGS: self.method.room.oscillations}
-        rows, places = self.selected.tobytes(), [where for where, needed in used.items() if needed]
-        if INTERPRETED and not self.h[m.RUN]:
-            run = lists_in_python(self.model)
-            interpreted[id(run)] = run
-            self.h[m.RUN], self.h[places] = id(run), 2 * PART * np.array(places, dtype=np.int64)
-        elif not INTERPRETED and not self._by_python:
-            for where in places:
-                calls = call_list(self.model, self.h, self.specialised, rows, progress, where)
-                self.h[m.RUN], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data
+        self.connect(progress)
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row, in this thread."""
-        self._connect_lists()
-        self.connect_record(silent)
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
         given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
         function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
-        self._connect_lists()
         group, record = self.specialised.group, _record(outputs, rows, events)
         if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
             group.advance(self.entry.addresses["advance"], [*self._arrays(), *record])
@@ -249,8 +211,14 @@ class Engine:
         """Store the rate of the state in Y at time t in the first row of SLOPES; repeat: number of evaluations."""
         function("advance", self.entry.addresses["advance"])(*self._arrays(), t, repeat, *_record(*NO_RECORD))
 
+    def evaluate_laws(self, t: float) -> None:
+        """Store the values and rates of all laws at time t."""
+        function("prescribe", self.entry.addresses["prescribe"])(*self._arrays(), t)
+
     def _arrays(self) -> tuple[Any, ...]:
-        """Return the addresses of h, f, w and n for compiled functions."""
+        """Return the addresses of h, f, w and n for compiled functions, of which those called are connected."""
+        if not self.h[m.EVALUATE]:
+            self.connect()
         return place(self.h, np.int64), place(self.model.arrays.f), place(self.w), place(self.n, np.int64)
 
     def view(self, index: int) -> np.ndarray:
@@ -321,9 +289,10 @@ class Engine:
         diagonal = envelope["origin"] + np.arange(len(envelope))
         return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
 
-    def rows(self, stored: int) -> np.ndarray:
-        """Return JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
-        return selection.dense_rows(self.model, self.h, self.view(stored))
+    @property
+    def jacobian(self) -> np.ndarray:
+        """Jacobian of the closures at the state evaluated last, shape (selected rows, free coordinates)."""
+        return selection.dense_rows(self.model, self.h, self.view(m.JACOBIAN))
 
 
 def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[Any, ...]:
@@ -343,7 +312,10 @@ def prepare(model: Model, progress: Progress) -> Engine:
         return make(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
-    return assemble(model, entry, METHODS[solver.integrator], mobility)
+    engine = assemble(model, entry, METHODS[solver.integrator], mobility)
+    if not mobility.redundant:
+        engine.connect(progress)
+    return engine
 
 
 def assemble(
@@ -355,7 +327,6 @@ def assemble(
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
     engine = kind(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
     engine.reset()
-    engine.connect()
     return engine
 
 

@@ -1,8 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
 It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
-steps run a list of calls of routines, and all other evaluations are those of kernels. A list always evaluates what the
-record has. The topology alone decides, so that equal scenes give equal bytes.
+steps run a list of calls of routines. All other evaluations are lists that store what the record has. The topology
+alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
 from flexclear.dynamics.compile.files import PART
-from flexclear.dynamics.compile.sources import SPECIALISED, WHOLE
+from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
@@ -32,11 +32,9 @@ if TYPE_CHECKING:
     from flexclear.dynamics.routines.store import ListInstance, LoadedList
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
-#: modes of a body up to which a list is compiled where few states are evaluated: twice the modes, eight times the code
-MOST_MODES = 40
 _making = Lock()
-#: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
-_known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
+#: addresses by parts, topology, lanes, whether exact and whether with changes, for all engines of the process
+_known: dict[tuple[Parts, Topology, int, bool, bool], int] = {}
 
 
 @dataclass
@@ -46,10 +44,8 @@ class SpecialisedCode:
     exact: whether one state and several at once must give the same bits.
     place: for stepping together with others; by default each engine takes its own steps.
     group: the group at that place, for the closure rows of its code.
-    addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
+    addresses: of the code, by the closure rows that it solves for.
     lists: of calls of routines, by closure rows and their place in h.  running: these with their own results.
-    seldom: whether only few states are evaluated, of which Python evaluates bodies with many modes.  callbacks: what
-    compiled functions call for that.
     rows: those for which the present integration has specialised steps.  They belong to one integration, since other
     integrations of this engine must not change a bit of this one.
     """
@@ -57,39 +53,24 @@ class SpecialisedCode:
     exact: bool = False
     place: Place | None = None
     group: LaneGroup | None = None
-    addresses: dict[tuple[bytes, str], int] = field(default_factory=dict)
+    addresses: dict[bytes, int] = field(default_factory=dict)
     lists: dict[tuple[bytes, int], LoadedList] = field(default_factory=dict)
     running: dict[tuple[bytes, int], ListInstance] = field(default_factory=dict)
-    seldom: bool = False
-    callbacks: list[Any] = field(default_factory=list)
     rows: list[bytes] = field(default_factory=list)
 
 
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
-    """Return the sources of a model's evaluation, by name, with all closure rows: the longest code.
-
-    Steps that solve for all rows are specialised as well; for redundant rows that is decided later.
-    """
-    if INTERPRETED:
-        return sources.kernels(model.parts)
-    topology = topology_of(model.arrays, model.arrays.h)
-    names = (WHOLE,) if mobility.redundant else (WHOLE, SPECIALISED)
-    return {name: sources.specialised(model.parts, topology, name) for name in names}
+    """Return the source of specialised steps, by name; none with redundant closure rows, which await a selection."""
+    if INTERPRETED or mobility.redundant:
+        return {}
+    return {SPECIALISED: sources.specialised(model.parts, topology_of(model.arrays, model.arrays.h))}
 
 
-def address(
-    model: Model,
-    h: np.ndarray,
-    code: SpecialisedCode,
-    rows: bytes,
-    name: str = SPECIALISED,
-    progress: Progress = silent,
-) -> int:
-    """Return the address of specialised code for closure rows, by its name (`compile.sources`)."""
-    known = code.addresses
-    if (rows, name) not in known:
-        known[rows, name] = made(model, h, rows, progress, name, exact=code.exact)
-    return known[rows, name]
+def address(model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent) -> int:
+    """Return the address of specialised code for closure rows; 0 when there is none."""
+    if rows not in code.addresses:
+        code.addresses[rows] = made(model, h, rows, progress, exact=code.exact)
+    return code.addresses[rows]
 
 
 def call_list(
@@ -137,18 +118,18 @@ def lists_in_python(model: Model) -> Callable:
     return run
 
 
-def described_in_python(model: Model, laws: Callable) -> Callable:
-    """Return a function that Python evaluates in place of the list of the record; laws: evaluates the laws of time."""
+def evaluated_in_python(model: Model, laws: Callable, where: int = m.RECORD_CALLS) -> Callable:
+    """Return a function that Python evaluates in place of a list; laws: evaluates the laws of time."""
     from flexclear.dynamics.mechanics.of_topology import list_of
     from flexclear.dynamics.routines.numbers import Numbers
 
-    def describe(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, y: int, dy: int) -> None:
+    def evaluate(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, y: int, dy: int) -> None:
         laws(h, f, w, n, t)
         calls = Numbers(h, f, w, n, int(y), int(dy))
-        list_of(model.parts, topology_of(model.arrays, h), m.RECORD_CALLS, calls)
-        n[m.EVALUATION], n[m.ABRIDGED], n[m.STATE] = calls.report, 1, y
+        list_of(model.parts, topology_of(model.arrays, h), where, calls)
+        n[m.EVALUATION], n[m.ABRIDGED], n[m.STATE] = calls.report, int(where == m.CALLS), y
 
-    return describe
+    return evaluate
 
 
 def selected(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
@@ -163,28 +144,24 @@ def made(
     h: np.ndarray,
     rows: bytes,
     progress: Progress,
-    name: str = SPECIALISED,
     lanes: int = 1,
     *,
     exact: bool = False,
 ) -> int:
     """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
-    parts, of_steps = model.parts, name == SPECIALISED
-    changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
+    parts, changes = model.parts, bool(h[m.N_CHANGES])
     with _making:  # engines may run concurrently
         topology = topology_of(model.arrays, selected(model, h, rows))
-        key = (parts, topology, name, lanes, exact, changes)
+        key = (parts, topology, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
                 source = sources.batched(parts, topology, lanes)
             else:
                 source = (
-                    sources.tangent(parts, topology)
-                    if changes
-                    else sources.specialised(parts, topology, name, exact=exact)
+                    sources.tangent(parts, topology) if changes else sources.specialised(parts, topology, exact=exact)
                 )
             try:
-                _known[key] = functions.specialised(name, source, partial(progress, None))
+                _known[key] = functions.specialised(SPECIALISED, source, partial(progress, None))
             except UnsuitedError:
                 if changes:
                     raise

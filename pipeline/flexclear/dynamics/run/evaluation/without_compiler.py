@@ -20,7 +20,8 @@ from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.run.evaluation.engine import MAKER, Engine, assemble
-from flexclear.dynamics.run.evaluation.specialised_code import described_in_python, lists_in_python
+from flexclear.dynamics.run.evaluation.specialised_code import evaluated_in_python, lists_in_python
+from flexclear.system.progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,12 @@ class PythonEngine(Engine):
 
     entry: Uncompiled
 
-    def connect(self) -> None:
+    def connect(self, progress: Progress = silent) -> None:
         """Leave the header as it is."""
+
+    def evaluate_laws(self, t: float) -> None:
+        """Store the values and rates of all laws at time t."""
+        self.entry.kernels.laws(*self._numbers(), t)
 
     def evaluate(self, t: float, repeat: int = 1) -> None:
         """Store the rate of the state in Y at time t in the first row of SLOPES."""
@@ -72,7 +77,7 @@ def without_compiler() -> Iterator[None]:
 
 
 def _kernels(model: Model) -> SimpleNamespace:
-    calls = SimpleNamespace(describe=described_in_python(model, lambda *given: calls.laws(*given)))
+    calls = SimpleNamespace(evaluate=evaluated_in_python(model, lambda *given: calls.laws(*given)))
     run = lists_in_python(model)
     calls.correct = lambda *given: run(*given, 2 * PART * m.CLOSE)
     calls.rates = lambda d, *given: calls.evaluate(d.h, d.f, d.w, d.n, *given)
