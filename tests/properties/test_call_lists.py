@@ -18,7 +18,7 @@ from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.routines import store
 from flexclear.dynamics.routines.calls import RESULTS, SCENE, CallList, Cell, cells, routine
 from flexclear.dynamics.routines.store import load
-from flexclear.dynamics.routines.symbols import UndecidableError, branch, larger, smaller
+from flexclear.dynamics.specialise.symbols import UndecidableError, branch, larger, smaller
 from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.schema import Scene
 from tests.properties.articulated_chains import evaluated, rods, tabulated

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from flexclear.dynamics.contact import friction
 from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
 from flexclear.dynamics.mechanics.bearings import pressure
-from flexclear.dynamics.mechanics.vectors import Matrix, Vector, Wrench
+from flexclear.dynamics.vectors import Matrix, Vector, Wrench
 from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
 from tests.properties.kernels import from_python

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
 
 from benchmarks.families.growth import four_bars
 from flexclear.dynamics import joints
@@ -13,10 +14,8 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures, flexible, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
 from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
-from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
 from flexclear.dynamics.mechanics.of_topology import list_of, mechanism_of
 from flexclear.dynamics.mechanics.tables import Tables
-from flexclear.dynamics.mechanics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.mechanism import build
@@ -28,6 +27,7 @@ from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.dynamics.specialise.topology import topology_of
+from flexclear.dynamics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent

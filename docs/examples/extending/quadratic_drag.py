@@ -6,9 +6,9 @@ r"""Drag of a fluid at rest on the origin of a frame: against its velocity, with
 from __future__ import annotations
 
 import numpy as np
+from flexclear.dynamics.loads.fields import act, number
 
 from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, number
 from flexclear.dynamics.loads.row import Row
 from flexclear.dynamics.vectors import cross, dot, scale
 from flexclear.scene.loads import QuadraticDrag

@@ -28,7 +28,6 @@ def _laws(scene: Scene) -> list[str]:
 JOINT_FRICTION = Effect(
     "joint_friction",
     lambda scene: _laws(scene) or None,
-    "FRICTION_LAWS",
     topology={
         # site_a, site_b: of its frames; link: the link whose inboard joint it is, or -1; reversed: 1 when that link is
         # on the side of the first frame; closure: its closure, or -1
@@ -59,12 +58,6 @@ JOINT_FRICTION = Effect(
         "bearing_residuals:n_bearings",
         "smooth_multiplier:n_closure_rows*?n_bearings",
     ),
-    compose={
-        "evaluate": {
-            "friction": "(<equations.joint_friction.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
-            "<equations.joint_friction.load_drives>)"
-        },
-    },
     ledger=True,
     guards=True,
 )

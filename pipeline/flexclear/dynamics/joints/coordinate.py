@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2
 from typing import Any
 
 import numpy as np
-
-from flexclear.dynamics.kernels import kernel
 
 
 @dataclass(frozen=True)
@@ -77,14 +74,3 @@ TRANSLATION = Coordinate("translation", False)
 def angle_about_z(R: np.ndarray) -> float:
     """Return the angle [rad] in (-pi, pi] of the rotation about z that equals R or is nearest to R."""
     return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
-
-
-def rates_are_speeds(count: int) -> Callable:
-    """Build `position_rate` for a joint of `count` speeds, each of which is the rate of a position."""
-
-    @kernel
-    def position_rate(w, x, u, rate):
-        for k in range(count):
-            w[rate + k] = w[u + k]
-
-    return position_rate

@@ -9,15 +9,17 @@ from typing import Any
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact.wear import LEDGER
+from flexclear.dynamics.loads import LOADS
+from flexclear.dynamics.loads.given import Law
 from flexclear.dynamics.loads.lookup import length
 from flexclear.dynamics.mechanics.contacts import stop, touch
 from flexclear.dynamics.mechanics.gears import coupling
-from flexclear.dynamics.mechanics.loads import STATES, Law, act
+from flexclear.dynamics.mechanics.loads import act
 from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link, Rubbed, Rubbing
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Site
-from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
 from flexclear.dynamics.routines.calls import MODES, RATES, SCENE, STATE, Cell, Span, cells
+from flexclear.dynamics.vectors import UNIT, ZERO
 
 #: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
 Gauge: Any = namedtuple("Gauge", "turning side axis sine_f sine_g cosine_f cosine_g")
@@ -102,7 +104,7 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
     made = list[Action]()
     for row, name, law, number, look, bend in zip(rows, names, *spans, strict=True):
         kind = tuple(name.split(maxsplit=1))
-        states, rates = _internal(tables, int(row["internal0"]), STATES.get(kind[0], 0))
+        states, rates = _internal(tables, int(row["internal0"]), getattr(LOADS[kind[0]], "STATES", 0))
         reading = _Reading(tables, frames, [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]])
         own = [reading.coordinate(k) for k in (row["gauge"], row["measured"]) if k >= 0]
         shown = ("coordinate", own[-1]) if own else ("distance" if row["a"] >= 0 else "nothing", 0)

@@ -16,9 +16,9 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from flexclear.dynamics.mechanics.trees import Gains, Motion, Numbers, Site, Step, carried
-from flexclear.dynamics.mechanics.vectors import ZERO, Twist, Vector, Wrench, cross, dot
 from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.routines.symbols import larger, select, smaller, sqrt
+from flexclear.dynamics.specialise.symbols import larger, select, smaller, sqrt
+from flexclear.dynamics.vectors import ZERO, Twist, Vector, Wrench, cross, dot
 
 #: pivots of J M^-1 J^T below this fraction of their diagonal entry indicate a singular pose
 SINGULAR = 1e-13

@@ -14,9 +14,9 @@ from flexclear.dynamics.mechanics import trees as t
 from flexclear.dynamics.mechanics.loops import Loops, Spread, closed, passed_inwards
 from flexclear.dynamics.mechanics.mechanism import Link, Mechanism, Modes, Rubbing
 from flexclear.dynamics.mechanics.trees import Coordinates
-from flexclear.dynamics.mechanics.vectors import Wrench
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell, routine
-from flexclear.dynamics.routines.symbols import select
+from flexclear.dynamics.specialise.symbols import select
+from flexclear.dynamics.vectors import Wrench
 
 
 @routine

@@ -25,9 +25,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
+from flexclear.dynamics.joints.rotation_vector import rotation, series
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics.closures import Rows, Wrenches, backward, forward
-from flexclear.dynamics.mechanics.joints import rotation, series
 from flexclear.dynamics.mechanics.trees import (
     MASSLESS,
     Beyond,
@@ -39,7 +39,9 @@ from flexclear.dynamics.mechanics.trees import (
     Step,
     carrying,
 )
-from flexclear.dynamics.mechanics.vectors import (
+from flexclear.dynamics.routines.calls import routine
+from flexclear.dynamics.specialise.symbols import cos, select, sin
+from flexclear.dynamics.vectors import (
     AT_REST,
     WITHOUT,
     ZERO,
@@ -54,8 +56,6 @@ from flexclear.dynamics.mechanics.vectors import (
     skew,
     total,
 )
-from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.routines.symbols import cos, select, sin
 
 Places = Sequence[tuple[int, ...]]
 

@@ -11,8 +11,8 @@ from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
 from flexclear.dynamics.mechanics.mechanism import Closure, Frame, Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.trees import Columns
-from flexclear.dynamics.mechanics.vectors import ZERO, Wrench
 from flexclear.dynamics.routines.calls import CallList
+from flexclear.dynamics.vectors import ZERO, Wrench
 
 #: frames and wrenches on them, one for each row
 Ends = Sequence[tuple[Frame, c.Wrenches]]

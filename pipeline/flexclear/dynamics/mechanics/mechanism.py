@@ -21,8 +21,8 @@ from flexclear.dynamics.mechanics.trees import (
     Site,
     Step,
 )
-from flexclear.dynamics.mechanics.vectors import AT_REST, Twist, Wrench
 from flexclear.dynamics.routines.calls import Cell
+from flexclear.dynamics.vectors import AT_REST, Twist, Wrench
 
 Cells = Sequence[Cell]
 

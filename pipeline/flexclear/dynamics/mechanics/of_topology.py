@@ -8,21 +8,21 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.effects import Parts
+from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.evaluation import evaluated
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
-from flexclear.dynamics.mechanics.joints import JOINTS
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.record import describe
 from flexclear.dynamics.mechanics.responses import LISTS, listed
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
-from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
 from flexclear.dynamics.routines.calls import RATES, STATE, CallList, Cell, cells
 from flexclear.dynamics.routines.straight import OneTape
 from flexclear.dynamics.specialise.code import Program
 from flexclear.dynamics.specialise.topology import Topology
+from flexclear.dynamics.vectors import Matrix, Symmetric, Vector
 
 
 def list_of(parts: Parts, topology: Topology, where: int = m.CALLS, calls: CallList | None = None) -> CallList:
@@ -163,7 +163,7 @@ def _joint_state(tables: Tables, link: Any, kind: str) -> tuple[Coordinates, lis
         laws = [tables.row(m.LAW, k - tables.nv) for k in range(u, u + count)]
         book = int(tables.table(m.DRIVES)["book"][u - tables.nv])
         return Coordinates(*map(list, zip(*laws, strict=True))), [], book
-    places = (q, count + JOINTS[kind].redundant), (tables.nq + u, count)
+    places = (q, len(JOINTS[kind].POSITIONS) if count else 0), (tables.nq + u, count)
     x, v = (cells(STATE, *place) for place in places)
     return Coordinates(x, v, [0.0] * count), [cell for place in places for cell in cells(RATES, *place)], -1
 

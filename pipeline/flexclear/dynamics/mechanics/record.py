@@ -14,8 +14,8 @@ from flexclear.dynamics.mechanics.loops import Loops, jacobian
 from flexclear.dynamics.mechanics.mechanism import Carrier, Link, Mechanism, Modes
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Site
-from flexclear.dynamics.mechanics.vectors import UNIT, ZERO, Twist, Vector
 from flexclear.dynamics.routines.calls import CallList, Cell
+from flexclear.dynamics.vectors import UNIT, ZERO, Twist, Vector
 
 
 def describe(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallList) -> None:

@@ -22,8 +22,8 @@ from flexclear.dynamics.mechanics.evaluation import (
 )
 from flexclear.dynamics.mechanics.loops import Loops, linked, passed_inwards
 from flexclear.dynamics.mechanics.mechanism import Link, Mechanism, Modes
-from flexclear.dynamics.mechanics.vectors import ZERO, Wrench
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell
+from flexclear.dynamics.vectors import ZERO, Wrench
 
 #: time over which a gap is closed [s]: modes with shorter periods respond by their stiffness, not by their mass
 CLOSING = 0.1

@@ -17,8 +17,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from flexclear.dynamics.mechanics.joints import JOINTS
-from flexclear.dynamics.mechanics.vectors import (
+from flexclear.dynamics.joints import JOINTS
+from flexclear.dynamics.routines.calls import routine
+from flexclear.dynamics.specialise.symbols import select, sqrt
+from flexclear.dynamics.vectors import (
     AT_REST,
     UNIT,
     WITHOUT,
@@ -35,8 +37,6 @@ from flexclear.dynamics.mechanics.vectors import (
     skew,
     total,
 )
-from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.routines.symbols import select, sqrt
 
 #: pivots D at most this fraction of the largest that all inertia beyond could give in any pose mean a coordinate that
 #: moves no mass; rounding leaves a few times 1e-16 of it
@@ -283,13 +283,13 @@ def accelerate(kind: str, coordinates: Coordinates, parent: Twist, step: Step, g
     for s, gain, force in reversed(list(zip(step.S, gains, forces, strict=True))):
         rates.insert(0, gain.root * (force - gain.K.on(a)))
         a = a + s * rates[0]
-    return [*JOINTS[kind].rate(coordinates.x, coordinates.u), *rates], a
+    return [*JOINTS[kind].position_rate(coordinates.x, coordinates.u), *rates], a
 
 
 @routine
 def turned(kind: str, x: Numbers, u: Numbers) -> list[Any]:
     """Return the rates of a joint's positions at speeds, or their change by a small displacement."""
-    return list(JOINTS[kind].rate(x, u))
+    return list(JOINTS[kind].position_rate(x, u))
 
 
 @routine
@@ -301,7 +301,7 @@ def displaced(kind: str, x: Numbers, by: Numbers) -> list[Any]:
     """
     reached, slopes = list(x), list[Numbers]()
     for reach in (0.5, 0.5, 1.0, 0.0):
-        slopes.append(JOINTS[kind].rate(reached, by))
+        slopes.append(JOINTS[kind].position_rate(reached, by))
         reached = [one + reach * slope for one, slope in zip(x, slopes[-1], strict=True)]
     first, second, third, fourth = slopes
     total = [a + 2.0 * (b + c) + d for a, b, c, d in zip(first, second, third, fourth, strict=True)]

@@ -21,8 +21,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.code import Program
+from flexclear.dynamics.specialise.symbols import Indexed, leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, Branch, Loop, Symbol
 
 #: numbers of the scene, the state, its rates, the work space of the engine, the results of the list's own calls, and
@@ -46,18 +46,6 @@ class Span:
 
     def __init__(self, array: str, index: int) -> None:
         self.array, self.index = array, index
-
-
-class Indexed:
-    """A span in a routine: numbers by their index, an integer or a symbol. load: of the number at an index."""
-
-    __slots__ = ("load",)
-
-    def __init__(self, load: Callable[[Any], Any]) -> None:
-        self.load = load
-
-    def __getitem__(self, index: Any) -> Any:
-        return self.load(index)
 
 
 class Code(NamedTuple):

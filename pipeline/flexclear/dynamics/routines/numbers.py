@@ -21,13 +21,12 @@ from flexclear.dynamics.routines.calls import (
     WORK,
     CallList,
     Cell,
-    Indexed,
     Span,
     inline,
     parted,
 )
-from flexclear.dynamics.routines.symbols import leaves, rebuilt
 from flexclear.dynamics.specialise import topology as topologies
+from flexclear.dynamics.specialise.symbols import Indexed, leaves, rebuilt
 
 
 class Numbers(CallList):

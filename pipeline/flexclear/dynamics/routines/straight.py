@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.routines import symbols
 from flexclear.dynamics.routines.calls import (
     MODES,
     RATES,
@@ -19,14 +18,14 @@ from flexclear.dynamics.routines.calls import (
     STATE,
     CallList,
     Cell,
-    Indexed,
     Span,
     inline,
     parted,
 )
-from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
+from flexclear.dynamics.specialise import symbols
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.specialise.code import Program
+from flexclear.dynamics.specialise.symbols import Indexed, leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.tape import FLOAT, INTEGER
 
 

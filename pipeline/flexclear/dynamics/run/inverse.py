@@ -27,7 +27,6 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Piece, Pieces
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.mechanics.vectors import ZERO, Wrench
 from flexclear.dynamics.model.driving import coordinate_of
 from flexclear.dynamics.model.laws import NO_LAWS
 from flexclear.dynamics.model.mechanism import build
@@ -39,6 +38,7 @@ from flexclear.dynamics.run.evaluation.matrices import Matrices
 from flexclear.dynamics.run.evaluation.observation import observe
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.dynamics.vectors import ZERO, Wrench
 from flexclear.scene.drives import JointDrive, PathDrive
 from flexclear.scene.laws import Constant
 from flexclear.scene.loads import JointForce

@@ -11,12 +11,10 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable
-from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
-from flexclear.dynamics.specialise.plain import FUNCTIONS, Plain
 from flexclear.dynamics.specialise.rules import RULES
 
 
@@ -117,15 +115,6 @@ def _apply(name: str, function: Callable, *arguments: Any) -> Any:
     changes = tuple(a.change if isinstance(a, Dual) else 0.0 for a in arguments)
     change = RULES[name](_Numbers, result, values, changes)
     return Dual(result, change) if isinstance(change, np.ndarray) else result
-
-
-@cache
-def plain(kernel: Any) -> Callable:
-    """Return the kernel as a function of Python on numbers, also with changes."""
-    assert set(FUNCTIONS) <= RULES.keys()
-    largest, smallest = lambda a, b: b if b > a else a, lambda a, b: b if b < a else a
-    function: Callable = Plain(lambda name: partial(function_of, name), largest, smallest)(kernel)
-    return function
 
 
 def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:

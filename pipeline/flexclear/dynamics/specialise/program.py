@@ -14,32 +14,13 @@ from llvmlite import ir
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.specialise.code import Emitter, Program, loads
-from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, same
-from flexclear.dynamics.specialise.trace import Memory, Trace
 
-#: operations beyond which specialised code takes longer to build than kernels and is hardly faster: it no longer fits
-#: the processor's first caches; beyond which lists of calls are faster; and the limit for tangents, which have no list
+#: operations beyond which straight code with the same bits in each lane takes too long to build; beyond which lists of
+#: calls are faster; and the limit for tangents, which have no list
 LONGEST, LONGEST_STRAIGHT, LONGEST_DIFFERENTIATED = 50_000, 20_000, 80_000
-#: integers of n that are stored
-REPORTS = {m.EVALUATION, m.ABRIDGED}
 _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
 #: name of the function
 NAME = "specialised"
-
-
-def program(kernel: Callable, topology: topologies.Topology, longest: int = 0) -> Program:
-    """Return the program of kernel rates(h, f, w, n, y, dy) for a topology, which stores all of w.
-
-    Raises UnsuitedError when it has more than `longest` operations, or `LONGEST` for 0.
-    """
-    h, trace = topologies.header(topology), Trace(longest or LONGEST)
-    w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
-    ground = topologies.ground(h)
-    w.values.update(ground)
-    trace.plain(kernel)(h, f, w, n, topologies.start(topologies.STATE), topologies.start(topologies.RATES))
-    changed = [(index, v) for index, v in w.values.items() if index not in ground or not same(v, ground[index])]
-    reports = [("n", index, v) for index, v in n.values.items() if index in REPORTS]
-    return Program(trace.tape.block, [*(("w", *one) for one in changed), *reports])
 
 
 def llvm_text(tape: Program, *, exact: bool = False) -> str:

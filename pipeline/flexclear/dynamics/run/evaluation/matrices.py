@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,11 +17,13 @@ from flexclear.dynamics.mechanics.of_topology import mechanism_of
 from flexclear.dynamics.mechanics.record import moving_parts
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Motion, on_body
-from flexclear.dynamics.mechanics.vectors import ZERO, Vector, Wrench
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.routines.numbers import Numbers
-from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.specialise.topology import topology_of
+from flexclear.dynamics.vectors import ZERO, Vector, Wrench
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.run.evaluation.engine import Engine
 
 #: unit forces, and unit moments
 UNITS = [Vector([float(i == k) for i in range(3)]) for k in range(3)]
@@ -36,7 +38,7 @@ class Matrices:
 
     def __init__(self, engine: Engine, *, every_row: bool = False) -> None:
         self.model, arrays = engine.model, engine.model.arrays
-        tables, self.calls = _on_numbers(engine, arrays.h if every_row else engine.h)
+        tables, self.calls = on_numbers(engine, arrays.h if every_row else engine.h)
         self.mechanism, self._rows0 = mechanism_of(tables), tables.table(m.CLOSURES)["kept0"].tolist()
         self._first = {moved: int(row["c0"]) for moved, row in moving_parts(tables, self.mechanism)}
         self._shape = tables.size(m.N_KEPT_ROWS), arrays.size(m.NV) + arrays.size(m.N_DRIVES)
@@ -136,7 +138,7 @@ def holding_forces(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
     """Return the forces that the motion needs without free accelerations, shape (nv,), with those on modes in the
     interface basis; and the wrench that each link and its subtree need for it, (links, 6): moments about the world's
     origin, and forces."""
-    tables, calls = _on_numbers(engine, engine.h)
+    tables, calls = on_numbers(engine, engine.h)
     mechanism, nothing = mechanism_of(tables), [0.0] * tables.size(m.N_KEPT_ROWS)
     balanced(mechanism, nothing, calls)
     on_links = [link.rest.F.about(link.motion.p_WB) for link in mechanism.links]
@@ -145,7 +147,7 @@ def holding_forces(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
     return calls.rates[engine.model.speeds].copy(), np.array(wrenches, dtype=float)
 
 
-def _on_numbers(engine: Engine, h: np.ndarray) -> tuple[Tables, Numbers]:
+def on_numbers(engine: Engine, h: np.ndarray) -> tuple[Tables, Numbers]:
     """Return a topology, and a list whose calls are done at once; the engine is not changed."""
     arrays, own = engine.model.arrays, engine.h
     calls = Numbers(own, arrays.f, engine.w.copy(), engine.n, int(own[m.Y]), int(own[m.SLOPES]))
