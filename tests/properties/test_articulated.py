@@ -13,7 +13,6 @@ from flexclear.dynamics.mechanics.evaluation import placed
 from flexclear.dynamics.mechanics.of_topology import mechanism_of, program_of
 from flexclear.dynamics.mechanics.record import store_energies
 from flexclear.dynamics.mechanics.tables import Tables
-from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.run.evaluation.engine import Engine
@@ -22,10 +21,19 @@ from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.specialise.topology import topology_of
+from flexclear.dynamics.vectors import Vector, Wrench
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.properties import tapes
-from tests.properties.articulated_chains import Evaluated, bending, evaluated, reduced, rods, tabulated
+from tests.properties.articulated_chains import (
+    Evaluated,
+    bending,
+    evaluated,
+    known_accelerations,
+    reduced,
+    rods,
+    tabulated,
+)
 from tests.properties.mechanisms import Table
 
 #: of the largest; the mass matrix of the chains here has a condition of 1e5 at most, of which 2e-12 was left
@@ -124,13 +132,14 @@ def mass_by_energy(found: Evaluated) -> np.ndarray:
 
 
 def drives_bias(found: Evaluated) -> np.ndarray:
-    """Forces of the drives without free accelerations: wrenches along their columns."""
-    moments, pushes = np.split(holding_forces(cast("Engine", found))[1], 2, axis=1)
-    columns, numbering = found.table(m.COLUMNS), found.model.numbering
-    made = np.zeros(len(found.drives))
+    """Forces of the drives without free accelerations: wrenches along their motions."""
+    engine, numbering, made = cast("Engine", found), found.model.numbering, np.zeros(len(found.drives))
+    wrenches, links = holding_forces(engine)[1], Matrices(engine).mechanism.links
     for i, coordinates in enumerate(numbering.coordinates):
-        for k in (c for c in coordinates if c >= numbering.nv):
-            made[k - numbering.nv] = columns["angular"][k] @ moments[i] + columns["linear"][k] @ pushes[i]
+        for e, k in enumerate(coordinates):
+            if k >= numbering.nv:
+                link, wrench = links[i - 1], Wrench(*map(Vector, np.split(wrenches[i], 2)))
+                made[k - numbering.nv] = wrench.about(-link.motion.p_WB).on(link.step.S[e])
     return made
 
 
@@ -154,13 +163,12 @@ def test_bodies_have_the_mass_that_their_energy_says(name: str) -> None:
     assert np.array_equal(L, np.tril(L))
     L = modes @ L
     assert apart(L @ L.T, M[:nv, :nv]) < 1e-12  # differences of energies in extended precision
-    selected = selection.selected_indices(model, found.h)
     by_routines, loops = (one := Matrices(cast("Engine", found))), one.loops
     J, spread = by_routines.jacobian[:, :nv], by_routines.dense({k: by.V for k, by in loops.found.items()})[:, :nv]
     assert apart(L @ spread.T, modes @ J.T) < ROUNDING
     J = J @ modes.T
     full_matrix = np.block([[M[:nv, :nv], J.T], [J, np.zeros((len(J),) * 2)]])
-    forces = np.concatenate([-modes @ holding_forces(cast("Engine", found))[0], found.stretch(m.GAMMA)[selected]])
+    forces = np.concatenate([-modes @ holding_forces(cast("Engine", found))[0], known_accelerations(found)])
     solved = np.linalg.solve(full_matrix, forces)[:nv]
     assert apart(found.rates[model.speeds], solved) < ROUNDING
     if not len(J):
@@ -169,7 +177,7 @@ def test_bodies_have_the_mass_that_their_energy_says(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["branches", "held shapes in a loop", "driven loop", "stiffened"])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_straight_code_of_flexible_bodies_computes_what_kernels_do(name: str) -> None:
+def test_straight_code_of_flexible_bodies_computes_what_calls_do(name: str) -> None:
     found = bent(name)
     model, h, w, n = found.model, found.h, found.w.copy(), found.space.n.copy()
     y, dy = int(h[m.Y]), int(h[m.SLOPES])
@@ -180,7 +188,7 @@ def test_straight_code_of_flexible_bodies_computes_what_kernels_do(name: str) ->
 
 
 def test_rounding_does_not_grow_with_the_number_of_flexible_rods() -> None:
-    """40 rods, against the same kernels in extended precision."""
+    """40 rods, against the same calls in extended precision."""
     model = tabulated(Scene.model_validate(bending((FREE,) * 40, angles=UP_AND_DOWN)))
     found, exact = (evaluated(model, number=number) for number in (float, np.longdouble))
     assert apart(found.rates[model.speeds], exact.rates[model.speeds].astype(float)) < 1e-12  # measured 9e-15
@@ -229,7 +237,7 @@ def test_a_plane_chain_has_its_closed_form() -> None:
 
 @pytest.mark.parametrize("plane", [True, False])
 def test_rounding_does_not_grow_with_the_length(plane: bool) -> None:
-    """300 links, against the same kernels in extended precision."""
+    """300 links, against the same calls in extended precision."""
     model = tabulated(Scene.model_validate(rods(300, plane=plane)))
     found, exact = (evaluated(model, 0.5, 0.3, number) for number in (float, np.longdouble))
     assert np.finfo(np.longdouble).eps < 1e-18

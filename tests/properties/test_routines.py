@@ -1,4 +1,7 @@
-"""Routines compute what kernels do: rates, what steps read besides, and reports; and one code serves any length."""
+"""Compiled lists of calls compute what the same calls do in Python: rates, what steps read besides, and reports.
+
+`test_articulated` and `test_recorded_states` compare what they compute with mechanics.
+"""
 
 import ctypes
 from dataclasses import replace
@@ -6,11 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
 
 from benchmarks.families.growth import four_bars
-from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.joints import JOINTS
+from flexclear.dynamics.joints.rotation_vector import SERIES_ANGLE, series
+from flexclear.dynamics.joints.rotation_vector import closed as closed_forms
 from flexclear.dynamics.mechanics import closures, flexible, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
 from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
@@ -50,7 +54,7 @@ from tests.properties.test_articulated import (
     massless,
 )
 
-#: of the largest rate of a kind; measured 5e-12 at worst: kernels refer wrenches to a distant origin
+#: of the largest rate of a kind: sums are taken in another order
 ROUNDING = 1e-10
 SCENES = (
     *("checks/bennett", "checks/bricard", "checks/door", "checks/four_bars_2", "checks/free_body", "checks/heavy_top"),
@@ -60,12 +64,12 @@ SCENES = (
 #: mechanisms that the units make up, without clearance
 CLOSED = [name for name in UNITS if "loose" not in name and "clearance" not in name]
 _EVALUATE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 4, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
-#: laws of time that leave those of the kernels' evaluation
+#: laws of time that leave those of the evaluation in Python
 NO_LAWS = ctypes.CFUNCTYPE(ctypes.c_int64)(lambda: 0)
 
 
 def without_results(found: Evaluated) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, int]:
-    """h, w and n of what kernels have evaluated, without what routines store; places of the state and its rates."""
+    """h, w and n of what was evaluated in Python, without what steps read; places of the state and its rates."""
     model, space = found.model, found.space
     h, w, n = space.h.copy(), space.w.astype(float), space.n.copy()
     y, dy, rows = int(h[m.Y]), int(h[m.SLOPES]), model.arrays.size(m.N_CLOSURE_ROWS)
@@ -84,7 +88,7 @@ def by_numbers(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
 
 
 def by_routines(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
-    """The work space w, and n, after an evaluation by routines of what kernels have evaluated; results are new."""
+    """The work space w, and n, after an evaluation by a compiled list of what was evaluated in Python."""
     model, f, (h, w, n, y, dy) = found.model, found.model.arrays.f, without_results(found)
     calls = load(list_of(model.parts, topology_of(model.arrays, h)), silent_text).instance(h)
     h[m.PRESCRIBE], h[m.CALLS] = ctypes.cast(NO_LAWS, ctypes.c_void_p).value, calls.words.ctypes.data
@@ -122,25 +126,25 @@ def assert_same(found: Evaluated, w: np.ndarray, n: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("name", TREES)
-def test_trees_move_as_by_kernels(name: str) -> None:
+def test_trees_move_as_in_python(name: str) -> None:
     assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]))))
 
 
 @pytest.mark.parametrize("name", [name for name in BENT if "friction" not in name])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_flexible_bodies_move_as_by_kernels(name: str) -> None:
+def test_flexible_bodies_move_as_in_python(name: str) -> None:
     assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]))))
 
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_scenes_move_as_by_kernels(name: str) -> None:
+def test_scenes_move_as_in_python(name: str) -> None:
     """Loops with redundant rows, drives of joints and of paths in loops."""
     assert_alike(evaluated(tabulate(build(load_scene(TREE / f"scenes/{name}.toml"), {}))))
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_joints_of_several_coordinates_close_loops_as_by_kernels() -> None:
+def test_joints_of_several_coordinates_close_loops_as_in_python() -> None:
     assert_alike(evaluated(tabulate(build(Scene.model_validate(two_loops()), {}))))
 
 
@@ -168,7 +172,7 @@ def opened(number: int) -> Model:
 
 @pytest.mark.parametrize("number", range(20))
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_random_mechanisms_move_as_by_kernels(number: int) -> None:
+def test_random_mechanisms_move_as_in_python(number: int) -> None:
     for model in (closed(number), opened(number)):
         assert_alike(evaluated(model))
 
@@ -193,13 +197,13 @@ def bent(number: int) -> Model:
 
 @pytest.mark.parametrize("number", range(20))
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_random_flexible_mechanisms_move_as_by_kernels(number: int) -> None:
+def test_random_flexible_mechanisms_move_as_in_python(number: int) -> None:
     assert_alike(evaluated(bent(number)))
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_rounding_does_not_grow_with_the_distance_from_the_origin() -> None:
-    """A thousand sizes away, against the same equations in extended precision; kernels leave 2e-10."""
+    """A thousand sizes away, against the same equations in extended precision."""
     random, setting = np.random.default_rng(0), movable.Setting(p=(-281.0, 870.0, -602.0))
     table = movable.scene(UNITS["spherical five-bar"](random), random, setting, load=GRAVITY)
     exact = evaluated(tabulate(build(Scene.model_validate(table), {})), number=np.longdouble)
@@ -229,10 +233,6 @@ def test_dependent_rows_are_a_singular_pose() -> None:
 
 
 # Joints ---------------------------------------------------------------------------------------------------------------
-def test_every_joint_type_has_a_row() -> None:
-    assert set(JOINTS) == set(joints.JOINTS)
-
-
 def positions(kind: str, random: np.random.Generator, scale: float) -> np.ndarray:
     """Random positions of a joint; quaternions of another norm than 1."""
     return scale * random.normal(size=len(joint_type(kind).POSITIONS))
@@ -249,7 +249,7 @@ def test_motions_of_joints_are_rates_of_their_poses(kind: str, scale: float) -> 
     def twist(x: np.ndarray) -> np.ndarray:
         return np.concatenate(trees.total(joint.motion(x.tolist(), u.tolist()).S, u.tolist()))
 
-    rate = np.array(joint.rate(x.tolist(), u.tolist()))
+    rate = np.array(joint.position_rate(x.tolist(), u.tolist()))
     ahead, behind = (joint.motion((x + side * step * rate).tolist(), u.tolist()) for side in (1.0, -1.0))
     here = joint.motion(x.tolist(), u.tolist())
     R, dR = np.reshape(here.R_FG, (3, 3)), np.subtract(ahead.R_FG, behind.R_FG).reshape(3, 3) / (2.0 * step)
@@ -272,7 +272,7 @@ def test_positions_of_joints_are_those_that_poses_have(kind: str) -> None:
 
 def test_series_of_rotation_vectors_go_over_into_closed_forms() -> None:
     """The rates of the coefficients, which are differences over the squared angle of 0.01, lose four digits more."""
-    found, exact = (of(SERIES_ANGLE) for of in (series, _closed))
+    found, exact = (of(SERIES_ANGLE) for of in (series, closed_forms))
     assert found[:3] == pytest.approx(exact[:3], abs=1e-13)
     assert found[3:] == pytest.approx(exact[3:], abs=1e-11)
 

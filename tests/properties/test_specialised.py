@@ -1,8 +1,6 @@
-"""Straight code for one topology computes what the kernels do, with any numbers, and is made again for no number."""
+"""Straight code for one topology computes what its calls do, with any numbers, and is made again for no number."""
 
-from contextlib import suppress
 from ctypes import CFUNCTYPE, c_void_p
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,13 +11,9 @@ from llvmlite import ir
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.choice import repeat
 from flexclear.dynamics.compile import compiler_process, files, functions, machine_code, sources
-from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.mechanics.of_topology import program_of
-from flexclear.dynamics.model import initial, selection
 from flexclear.dynamics.model.mechanism import build
-from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
@@ -27,41 +21,21 @@ from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.sensitivity.dataset import sensitivities
-from flexclear.dynamics.specialise import dual
 from flexclear.dynamics.specialise import program as tracing
 from flexclear.dynamics.specialise.code import Emitter, Program
-from flexclear.dynamics.specialise.program import program
+from flexclear.dynamics.specialise.symbols import new_tape, repeat
 from flexclear.dynamics.specialise.tape import FLOAT, Symbol, UnsuitedError
 from flexclear.dynamics.specialise.topology import topology_of
-from flexclear.dynamics.specialise.trace import Memory, Trace
 from flexclear.scene.load import edited, load_scene
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
+from tests.properties.articulated_chains import evaluated
 
 CHECKS = sorted((TREE / "scenes/checks").glob("*.toml"))
 RIGID = [path for path in CHECKS if not load_scene(path).flexible()]
 #: of the largest rate of a kind: sums are taken in another order, and a reciprocal stands for a quotient
 ROUNDING = 1e-9
-
-
-def rates_kernel(model: Model) -> Any:
-    """The kernel that the specialised code is made from."""
-    scope: dict[str, Any] = {}
-    exec(sources.specialised(model.parts, (), sources.WHOLE).partition("TOPOLOGY")[0], scope)
-    return scope["rates"]
-
-
-def keep_independent(model: Model, h: np.ndarray, y: int, dy: int, w: np.ndarray, n: np.ndarray, kernel: Any) -> None:
-    """Solve for as many closure rows as are independent, where some follow from others."""
-    mobility = analyse(model)
-    if not mobility.redundant:
-        return
-    with suppress(ZeroDivisionError):  # by a pivot of dependent rows, after their Jacobian
-        Trace(0).plain(kernel)(h.tolist(), model.arrays.f, w, n, y, dy)
-    J = selection.dense_rows(model, h, w[h[m.JACOBIAN] :][: h[m.JACOBIAN_SIZE]])
-    kept, _ = selection.choose(J, np.ones(len(J)), mobility.rank)
-    selection.write(model, h, kept)
 
 
 def apart(model: Model, one: np.ndarray, other: np.ndarray) -> float:
@@ -73,20 +47,10 @@ def apart(model: Model, one: np.ndarray, other: np.ndarray) -> float:
     return worst
 
 
-def test_what_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_would_be_too_long_is_refused() -> None:
     model = tabulate(build(load_scene(TREE / "scenes/checks/pendulum.toml"), {}))
-    monkeypatch.setattr(tracing, "LONGEST", 10)
     with pytest.raises(UnsuitedError, match="too long"):
-        program(rates_kernel(model), topology_of(model.arrays, model.arrays.work_space(m.Room(2, 0)).h))
-
-
-def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> float:
-    """Of two work spaces, as share of the largest number of a stretch."""
-    stretches, worst = [*m.STRETCHES.values(), *(table.at for table in m.TABLES["w"])], 0.0
-    for begin, end in pairwise(sorted({int(h[index]) for index in stretches} | {len(one)})):
-        a, b = one[begin:end], other[begin:end]
-        worst = max(worst, float(np.abs(a - b).max(initial=0.0)) / max(1.0, float(np.abs(a).max(initial=0.0))))
-    return worst
+        program_of(model.parts, topology_of(model.arrays, model.arrays.h), 10)
 
 
 def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
@@ -106,42 +70,24 @@ def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
 
 @pytest.mark.parametrize("path", RIGID, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All without a compiler: kernels on numbers, what they wrote on the tape, and what routines did; contacts open
-    and closed.
-
-    What steps read, and all of the work space; also of what would be too long.
-    """
-    monkeypatch.setattr(tracing, "LONGEST", 200_000)
+def test_every_scene_is_evaluated_alike(path: Path) -> None:
+    """All without a compiler: calls on numbers that store the record, and what those of steps wrote on a tape; contacts
+    open and closed. What steps read."""
     model = tabulate(build(load_scene(path), {}))
-    space, f = model.arrays.work_space(m.Room(2, 0)), model.arrays.f
-    h, y, dy = space.h, int(space.h[m.Y]), int(space.h[m.SLOPES])
-    kernel, start = rates_kernel(model), initial.start_state(model)
-    space.w[y : y + model.ny] = start
-    keep_independent(model, h, y, dy, space.w.copy(), space.n.copy(), kernel)
-    topology = topology_of(model.arrays, h)
-    tape, whole = program_of(model.parts, topology, 200_000), program(kernel, topology, 200_000)
-    start[model.speeds] += np.random.default_rng(1).normal(size=model.nv)
     for closed in (0, 1):
-
-        def begun(modes: int = closed) -> dict[str, np.ndarray]:
-            w, n = space.w.copy(), space.n.copy()
-            n[n[m.MODE] :], w[y : y + model.ny] = modes, start
-            w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
-            return {"f": f, "w": w, "n": n}
-
-        by_kernels, by_tape, by_whole = begun(), begun(), begun()
-        Trace(0).plain(kernel)(h.tolist(), f, by_kernels["w"], by_kernels["n"], y, dy)
-        tapes.run(tape, h, by_tape, y, dy)
-        tapes.run(whole, h, by_whole, y, dy)
-        assert [arrays["n"][m.ABRIDGED] for arrays in (by_kernels, by_tape, by_whole)] == [0, 1, 0]
-        assert all(arrays["n"][m.EVALUATION] == m.OK for arrays in (by_kernels, by_tape, by_whole))
-        one, other = by_kernels["w"], by_tape["w"]
-        assert apart(model, one[dy : dy + model.ny], other[dy : dy + model.ny]) < ROUNDING
-        for read in read_by_steps(model, h):
-            room = ROUNDING * np.abs(one[read]).max(initial=1.0)
-            assert other[read] == pytest.approx(one[read], rel=ROUNDING, abs=room)
-        assert largest_difference(h, one, by_whole["w"]) < ROUNDING
+        found = evaluated(model, speeds=1.0, closed=closed)
+        h, w, n = found.h, found.w.copy(), found.n.copy()
+        y, dy = int(h[m.Y]), int(h[m.SLOPES])
+        places = read_by_steps(model, h)
+        for place in (slice(dy, dy + model.ny), *places):
+            w[place] = np.nan
+        tape = program_of(model.parts, topology_of(model.arrays, h), 200_000)
+        tapes.run(tape, h, {"f": model.arrays.f, "w": w, "n": n}, y, dy)
+        assert (n[m.ABRIDGED], n[m.EVALUATION], found.report) == (1, m.OK, m.OK)
+        assert apart(model, found.rates, w[dy : dy + model.ny]) < ROUNDING
+        for read in places:
+            room = ROUNDING * np.abs(found.w[read]).max(initial=1.0)
+            assert w[read] == pytest.approx(found.w[read], rel=ROUNDING, abs=room)
 
 
 def engine(integrator: str = "dop853") -> Engine:
@@ -220,26 +166,23 @@ def test_friction_of_ideal_joints_is_in_what_steps_evaluate() -> None:
 
 
 def test_a_magnitude_is_never_below_zero_and_may_be_below_more() -> None:
-    tape = Trace(100).tape
+    tape = new_tape(100)
     x = tape.write(FLOAT, "load", "w", 0)
     assert (abs(x) < 0.0) is False
     assert (abs(x) < 0.0) is False
     assert all(isinstance(one, Symbol) for one in (abs(x) < 0.5, x < 0.0, abs(x) > 0.0))
 
 
-@kernel
-def halve_error(w):
-    """A turn of Newton's method for the root w[0] of w[1]; w[2] counts."""
-    before = w[0]
-    w[0] = 0.5 * (before + w[1] / before)
-    w[2] += 1.0
-    return abs(w[0] - before) > 1e-9 * before
+def root(x: Any) -> tuple[Any, Any]:
+    """The root of the second number from the first one on, by Newton's method, and the number of its turns."""
 
+    def halve_error(state: Any) -> tuple[Any, Any]:
+        before, turns = state
+        after = 0.5 * (before + x[1] / before)
+        return abs(after - before) > 1e-9 * before, (after, turns + 1.0)
 
-@kernel
-def find_root(w):
-    w[2] = 0.0
-    repeat(halve_error, w)
+    found: tuple[Any, Any] = repeat(halve_error, (x[0], 0.0))
+    return found
 
 
 @pytest.mark.parametrize("lanes", [1, 4])
@@ -248,11 +191,10 @@ def test_lanes_of_a_loop_turn_as_often_as_each_alone(lanes: int) -> None:
     states = np.array([[2.0, 4.0, np.nan], [1.0, 2.0, np.nan], [1.0, 1e6, np.nan], [1.0, 1e15, np.nan]])
     known = states.copy()
     for row in known:
-        dual.plain(find_root)(row)
-    trace = Trace(100)
-    w = Memory(trace, "w", FLOAT)
-    trace.plain(find_root)(w)
-    made = Program(trace.tape.block, [("w", index, value) for index, value in w.values.items()])
+        row[[0, 2]] = root(row)
+    tape = new_tape(100)
+    found = root([tape.write(FLOAT, "load", "w", index) for index in (0, 1)])
+    made = Program(tape.block, [("w", index, value) for index, value in zip((0, 2), found, strict=True)])
     function = ir.Function(ir.Module("m"), ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()]), "f")
     builder = ir.IRBuilder(function.append_basic_block())
     where = lambda array, index, lane: builder.gep(function.args[0], [INT(3 * lane + index)])  # noqa: E731

@@ -115,7 +115,7 @@ def friction_law(data: Data) -> Drawing:
 
 def coefficient(v: np.ndarray, v_static: float, v_dynamic: float, static: float, dynamic: float) -> np.ndarray:
     """Return the signed friction coefficient of the runs' law at a tangential velocity v [m/s]; the force opposes v."""
-    law = getattr(modified_coulomb.coefficient, "py_func", modified_coulomb.coefficient)
+    law = modified_coulomb.coefficient
     return np.array([np.sign(one) * law(abs(one), (static, dynamic, v_static, v_dynamic)) for one in v])
 
 
