@@ -16,10 +16,12 @@ and with
 
 from __future__ import annotations
 
+from typing import Any
+
 from flexclear.dynamics.joints import free, rotation_vector, spherical, turn_and_slide, universal
 
 #: by type; prescribed paths alone create a joint that no scene can name, the rotation vector
-JOINTS = {
+JOINTS: dict[str, Any] = {
     "spherical": spherical,
     "revolute": turn_and_slide.REVOLUTE,
     "universal": universal,
