@@ -35,9 +35,9 @@ def declared(name: str) -> Any:
 
 def move(name: str, x: np.ndarray, u: np.ndarray, du: np.ndarray) -> Motion:
     """What the joint says."""
-    part, twists = declared(name), np.zeros((len(u), 6))
+    part = declared(name)
     R, p, S, bias = part.motion(x.tolist(), u.tolist())
-    twists[:] = [np.ravel(one) for one in S]
+    twists = np.reshape(S, (len(u), 6))
     second = twists.T @ du + np.ravel(bias)
     rate = np.array(part.position_rate(x.tolist(), u.tolist()))
     return Motion(np.reshape(R, (3, 3)), np.array(p), twists.T @ u, second, twists.T, rate)
