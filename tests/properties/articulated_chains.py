@@ -230,7 +230,7 @@ def evaluated(
     space = space._replace(w=w.astype(number))
     by_routines(model, space, y, dy)
     drives = space.w[h[m.DRIVE_FORCE] :][: model.arrays.size(m.N_DRIVES)]
-    lengths = _work_lengths(h, m.Room(2, 0), model.arrays.columns)
+    lengths = _work_lengths(h, m.Room(2, 0))
     return Evaluated(model, space, space.w[dy : dy + model.ny], drives, int(n[m.EVALUATION]), lengths)
 
 

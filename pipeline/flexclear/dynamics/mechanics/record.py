@@ -79,7 +79,7 @@ def _wrenches(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallLis
 
 
 def _jacobian(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallList) -> None:
-    """Store the Jacobian of the rows that are solved for; three rows are together."""
+    """Store the Jacobian of the rows that are solved for."""
     first = {moved: int(row["c0"]) for moved, row in moving_parts(tables, mechanism)}
     closures, support = tables.table(m.CLOSURES), tables.table(m.SUPPORT)["coordinate"].tolist()
     for number, ends in loops.ends.items():
@@ -90,7 +90,7 @@ def _jacobian(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallLis
             places, values = list[Cell](), list[Any]()
             for k, row in enumerate(rows, start=first[moved]):
                 for r, value in enumerate(row if k in slots else ()):
-                    places += tables.stretch(m.JACOBIAN, begin + 3 * (size * (r // 3) + slots[k]) + r % 3, 1)
+                    places += tables.stretch(m.JACOBIAN, begin + size * r + slots[k], 1)
                     values.append(value)
             calls.write(places, values)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.arrays import envelope_size
-from flexclear.dynamics.model.index_tables import closure_envelope, threes
+from flexclear.dynamics.model.index_tables import closure_envelope
 from flexclear.dynamics.model.model import Model
 
 
@@ -68,7 +68,6 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
         order = np.argsort(~selected[span], kind="stable")
         rows[span] = declared[span][order]
         closure["kept0"], closure["n_kept"] = start, np.sum(selected[span])
-        closure["threes"] = threes(closure["n_kept"])
         start += int(closure["n_kept"])
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
     envelope["first"][:start], envelope["origin"][:start] = closure_envelope(
@@ -78,19 +77,14 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
 
 
 def dense_rows(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
-    """Return selected rows by free coordinates, (..., kept, nv), from the supports that the kernels store.
-
-    stored: JACOBIAN or SPREAD of the work space, shape (..., size).
-    """
+    """Return selected rows by free coordinates, (..., kept, nv), from those by their supports; stored: JACOBIAN of the
+    work space, shape (..., size)."""
     support = model.arrays.table(m.SUPPORT)["coordinate"]
     full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), model.nv))
     for c in model.arrays.table(m.CLOSURES, h):
-        count, slots, groups = int(c["n_kept"]), int(c["n_support"]), int(c["threes"])
-        columns = support[c["support0"] : c["support0"] + slots]
-        block = stored[..., c["jacobian0"] : c["jacobian0"] + 3 * groups * slots]
-        block = np.swapaxes(block.reshape(*stored.shape[:-1], groups, slots, 3), -1, -2)
-        block = block.reshape(*stored.shape[:-1], 3 * groups, slots)[..., :count, :]
-        full[..., c["kept0"] : c["kept0"] + count, columns] = block
+        count, size = int(c["n_kept"]), int(c["n_support"])
+        block = stored[..., c["jacobian0"] : c["jacobian0"] + count * size].reshape(*stored.shape[:-1], count, size)
+        full[..., c["kept0"] : c["kept0"] + count, support[c["support0"] : c["support0"] + size]] = block
     return full
 
 
