@@ -296,7 +296,8 @@ def test_a_shape_moves_mass_or_rounding(mass: float, sound: float) -> None:
         Inertia(*inertia_parts(np.random.default_rng(6))), none[0], none, [[1.0], [1.0, 1.0 + mass]], [0.0] * 2
     )
     with np.errstate(invalid="ignore"):
-        assert flexible.eliminate(body, [], np.float64(1.0))[-1] == sound
+        given = trees.Resistance(body.I, body.F), body.P, body.m, body.forces, flexible.none_taken(2)
+        assert flexible.eliminate(1, *given, [], np.float64(1.0))[-1] == sound
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
+from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -94,6 +95,9 @@ class Call(NamedTuple):
 
 #: goes back by as many entries as its second offset says, if the number at its first one exceeds one half
 BACK = Code("back", Program([], []), (RESULTS,))
+
+#: most products of a call
+MOST = 16
 
 _building: ContextVar[CallList | None] = ContextVar("building", default=None)
 
@@ -185,6 +189,29 @@ class CallList:
         if cells:
             self.call(_same, (list(values),), cells)
 
+    def products(
+        self, first: Cell, stride: int, entries: Sequence[np.ndarray], vectors: Sequence[Sequence[Any]], count: int
+    ) -> list[list[Any]]:
+        """Append calls that multiply vectors by a sparse matrix of `count` rows, whose numbers are in memory.
+
+        first, stride: place of its first number, and from one to the next.  entries: row, ascending, column, and which
+        number it is, of each.
+        """
+        sums: list[list[Any]] = [[0.0] * count for _ in vectors]
+        ends = np.flatnonzero(np.diff(entries[0], append=-1)) + 1
+        for begin, end in pairwise([0, *ends.tolist()]):
+            row = int(entries[0][begin])
+            for k in range(begin, end, MOST):
+                columns, numbers = (one[k : min(end, k + MOST)].tolist() for one in entries[1:])
+                values = [Span(first.array, first.index + stride * number) for number in numbers]
+                if numbers[-1] - numbers[0] == len(numbers) - 1:
+                    values = values[:1]
+                of_each = [[_alone(vector[column]) for column in columns] for vector in vectors]
+                total = self.call(_increased, (stride, [one[row] for one in sums], values, of_each))
+                for one, value in zip(sums, total, strict=True):
+                    one[row] = value
+        return sums
+
     def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
         """Append calls of a loop, and return the state after it: nested tuples of numbers.
 
@@ -201,8 +228,30 @@ class CallList:
         return present
 
 
+def products(*given: Any) -> list[list[Any]]:
+    """Append calls to the list that is under construction; see `CallList.products`."""
+    calls = _building.get()
+    assert calls is not None
+    return calls.products(*given)
+
+
 def _same(values: Any) -> Any:
     return (values,)
+
+
+def _increased(stride: int, sums: Sequence[Any], values: Sequence[Indexed], vectors: Sequence[Sequence[Any]]) -> Any:
+    """Return sums with the products of numbers, of which the first may locate all, and entries of each vector."""
+    count = len(vectors[0])
+    numbers = [values[k][0] if len(values) == count else values[0][stride * k] for k in range(count)]
+    return [
+        sum((a * (x[0] if isinstance(x, Indexed) else x) for a, x in zip(numbers, vector, strict=True)), one)
+        for one, vector in zip(sums, vectors, strict=True)
+    ]
+
+
+def _alone(number: Any) -> Any:
+    """Return a number in memory as one that is adjacent to no other, so that calls differ in no kind by it."""
+    return Span(number.array, number.index) if isinstance(number, Cell) else number
 
 
 def cells(array: str, begin: int, count: int) -> list[Cell]:
