@@ -11,7 +11,7 @@ from benchmarks.families import turning
 from benchmarks.families.growth import four_bars
 from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics import closures, flexible, trees
+from flexclear.dynamics.mechanics import closures, flexible, modes, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
 from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
 from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
@@ -347,19 +347,31 @@ def long(scene: Scene) -> Engine:
 
 #: ways of steps, and what makes the engine take them
 WAYS: dict[str, tuple[str, Any]] = {
-    "kernels": ("INTERPRETED", True),
+    "kernels": ("SELECTIONS", 0),
     "list": ("address", lambda *given, **more: 0),
     "straight code": ("SELECTIONS", 4),
 }
 
 
-def test_bodies_with_many_modes_step_by_kernels() -> None:
-    """Routines have a number per product of modes: 280 modes took more than 3 GB to compile, and did not end."""
-    body = turning.CASES["1-clamped-free"]()
-    one = engine_of(Scene.model_validate(turning.turning(body, 100.0)), {"rod": turning.reduced(body)}, silent)
-    assert one.model.arrays.size(m.MOST_MODES) > engine.MOST_MODES
-    one.settle(silent)
-    assert one.h[m.RATES] == one.h[m.EVALUATE] != 0
+@pytest.mark.parametrize("number", range(8))
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_shapes_in_blocks_move_as_by_kernels(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Held shapes, frames on bodies, bodies on these, loops, stiffening; most have blocks of unequal sizes."""
+    monkeypatch.setattr(modes, "FEW", 1)
+    monkeypatch.setattr(modes, "SIZE", 2)
+    assert_alike(evaluated(bent(number)))
+
+
+@pytest.mark.parametrize("case", ["1-clamped-free", "3a"])
+def test_codes_do_not_multiply_with_modes(case: str) -> None:
+    """Bodies of 79 and 280 modes: codes repeat, and are short."""
+    body = turning.CASES[case]()
+    scene = Scene.model_validate(turning.turning(body, 100.0))
+    found = evaluated(tabulate(build(scene, {"rod": turning.reduced(body)})))
+    assert_same(found, *by_numbers(found))
+    codes = list_of(found.model.parts, topology_of(found.model.arrays, found.h)).codes
+    assert len(codes) < 200  # measured 60 to 140
+    assert sum(len(code.program.block) for code in codes) < 50_000  # 25 000; each product once would be a million
 
 
 def by_ways(scene: Scene) -> dict[str, Trajectory]:

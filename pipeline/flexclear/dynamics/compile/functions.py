@@ -61,12 +61,6 @@ def function(name: str, address: int) -> Callable:
     return made
 
 
-def callback(kinds: str, run: Callable[..., int]) -> tuple[Any, int]:
-    """Return a function by which compiled code calls Python, to be kept, and its address; kinds: as in `SIGNATURES`."""
-    made = ctypes.CFUNCTYPE(ctypes.c_int64, *(_TYPES[kind] for kind in kinds))(run)
-    return made, int(ctypes.cast(made, ctypes.c_void_p).value or 0)
-
-
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
     """Return the address of an array's entries for C functions; raise TypeError for another type or memory layout."""
     if array.dtype != kind or not array.flags.c_contiguous:

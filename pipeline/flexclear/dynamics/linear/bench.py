@@ -99,7 +99,6 @@ def hold(
     model = tabulate(build(moved, bundles), given)
     arrays = replace(model.arrays, h=model.arrays.h.copy(), f=model.arrays.f.copy())
     engine = prepare(replace(model, arrays=arrays), progress)
-    engine.specialised.seldom = True
     start = initial.start_state(model)
     engine.select_pieces_after(engine.start)
     closure_rows.select_rows(engine, start, engine.start)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise, starmap
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,9 @@ from flexclear.dynamics.mechanics.vectors import AT_REST, ZERO, Twist, Vector
 from flexclear.dynamics.routines.calls import CallList, Cell, products
 from flexclear.dynamics.routines.symbols import leaves
 
-#: modes of a body up to which they are one block, and most modes of a block of those with more
-ALONE, SIZE = 48, 16
+#: modes of a body up to which they are one block, since code without tables serves short rows best; most of a block of
+#: those with more
+FEW, SIZE = 32, 16
 
 
 @dataclass(eq=False)
@@ -128,7 +130,7 @@ class Modes:
         return body, step
 
     def at_port(self, motion: t.Motion, port: f.Port) -> tuple[t.Site, t.Columns]:
-        """Return the site of a port on the deformed body, and its motion per rate of each shape (`flexible.at_port`)."""
+        """Return the site of a port on the body, and its motion per rate of each shape (`flexible.at_port`)."""
         if self.one:
             site, columns = f.at_port(motion, self.twists, port, *self.moving)
             return site, columns
@@ -136,7 +138,7 @@ class Modes:
         return site, [one for at in self._columns(motion, self.twists, site, *moves) for one in at]
 
     def _deformed(self, port: f.Port) -> tuple[t.Site, Any, list[Any], list[Any]]:
-        """Return the site of a port, T, and the derivatives of its displacement and rotation vector by moving shapes."""
+        """Return the site of a port, T, and its displacement and rotation vector per moving shape."""
         (p, rates), sums, slopes = self.moving, list[Any](), list[list[Any]]()
         for shapes in (port.moves, port.turns):
             bent, bending = curves(shapes.second, p, rates)
@@ -246,7 +248,7 @@ class Modes:
     def eliminate(
         self, need: f.Need, beyond: Sequence[t.Beyond], sound: Any, slowness: float
     ) -> tuple[t.Resistance, Any]:
-        """Eliminate all shapes; return what the body resists while they move freely, and `sound` (`flexible.eliminate`).
+        """Eliminate all shapes; return what the body resists while they move freely, and `sound` as `flexible` does.
 
         slowness: share [s^2] of their stiffness that shapes have in their mass.
         """
@@ -343,8 +345,8 @@ class Modes:
 
 def split(count: int) -> list[slice]:
     """Return blocks of modes or shapes."""
-    size = count if count <= ALONE else SIZE
-    return [slice(at, min(at + size, count)) for at in range(0, count, size or 1)] or [slice(0, 0)]
+    parts = 1 if count <= FEW else -(-count // SIZE)
+    return list(starmap(slice, pairwise(count * k // parts for k in range(parts + 1))))
 
 
 def columns(rows: Sequence[Any], at: slice) -> list[Any]:

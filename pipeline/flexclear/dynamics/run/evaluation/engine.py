@@ -29,7 +29,6 @@ from flexclear.dynamics.model.plausibility import start_errors
 from flexclear.dynamics.run import bushings, joint_friction
 from flexclear.dynamics.run.evaluation import table_ranges
 from flexclear.dynamics.run.evaluation.specialised_code import (
-    MOST_MODES,
     SpecialisedCode,
     address,
     call_list,
@@ -48,8 +47,6 @@ MAKER: ContextVar[Callable[[Model, Mobility], Engine] | None] = ContextVar("make
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: selections of closure rows with specialised steps, per integration
 SELECTIONS = 4
-#: modes of a body up to which steps run on routines, whose code grows as their cube: 50 take seconds to compile
-MOST_MODES = 64
 #: without steps: no output times, no rows, no events
 NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 
@@ -166,29 +163,9 @@ class Engine:
                 describe = described_in_python(self.model, interpreted[int(self.h[m.PRESCRIBE])])
                 interpreted[id(describe)], self.h[m.DESCRIBE] = describe, id(describe)
             return
-        if self._by_python:
-            return self._call_python()
         given = self.model, self.h, self.specialised, self.selected.tobytes(), progress
         calls = call_list(*given, m.RECORD_CALLS)
         self.h[m.DESCRIBE], self.h[m.RECORD_CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
-
-    @property
-    def _by_python(self) -> bool:
-        """True when code of lists would cost more than the few states that are evaluated."""
-        return self.specialised.seldom and self.model.arrays.size(m.MOST_MODES) > MOST_MODES
-
-    def _call_python(self) -> None:
-        """Let Python evaluate the lists besides the steps'."""
-        if self.specialised.callbacks:
-            return
-        arrays = self.h, self.model.arrays.f, self.w, self.n
-        laws = function("prescribe", int(self.h[m.PRESCRIBE]))
-        describe = described_in_python(self.model, lambda *given: laws(*self._arrays(), given[-1]))
-        run, places = lists_in_python(self.model), [m.CLOSE, m.MOVE, m.SPRINGS]
-        for kinds, place_of, of in (("IFFIfii", m.DESCRIBE, describe), ("IFFIfiii", m.RUN, run)):
-            kept, self.h[place_of] = functions.callback(kinds, lambda *given, of=of: of(*arrays, *given[4:]) or 0)
-            self.specialised.callbacks.append(kept)
-        self.h[places] = 2 * PART * np.array(places, dtype=np.int64)
 
     @property
     def staged(self) -> bool:
@@ -206,8 +183,7 @@ class Engine:
             if specialised.place is not None and specialised.group is None and self.staged:
                 where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
                 specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
-            few = len(specialised.rows) < SELECTIONS and self.model.arrays.size(m.MOST_MODES) <= MOST_MODES
-            if rows not in specialised.rows and (few or changes):
+            if rows not in specialised.rows and (len(specialised.rows) < SELECTIONS or changes):
                 specialised.rows.append(rows)
             for met in specialised.rows:
                 if not address(self.model, self.h, specialised, met, progress=progress):
@@ -223,7 +199,7 @@ class Engine:
             run = lists_in_python(self.model)
             interpreted[id(run)] = run
             self.h[m.RUN], self.h[places] = id(run), 2 * PART * np.array(places, dtype=np.int64)
-        elif not INTERPRETED and not self._by_python:
+        elif not INTERPRETED:
             for where in places:
                 calls = call_list(self.model, self.h, self.specialised, rows, progress, where)
                 self.h[m.RUN], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data

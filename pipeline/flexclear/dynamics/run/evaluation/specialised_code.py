@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from flexclear.dynamics.routines.store import ListInstance, LoadedList
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
-#: modes of a body up to which a list is compiled where few states are evaluated: twice the modes, eight times the code
-MOST_MODES = 40
 _making = Lock()
 #: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
 _known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
@@ -48,8 +46,6 @@ class SpecialisedCode:
     group: the group at that place, for the closure rows of its code.
     addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
     lists: of calls of routines, by closure rows and their place in h.  running: these with their own results.
-    seldom: whether only few states are evaluated, of which Python evaluates bodies with many modes.  callbacks: what
-    compiled functions call for that.
     rows: those for which the present integration has specialised steps.  They belong to one integration, since other
     integrations of this engine must not change a bit of this one.
     """
@@ -60,8 +56,6 @@ class SpecialisedCode:
     addresses: dict[tuple[bytes, str], int] = field(default_factory=dict)
     lists: dict[tuple[bytes, int], LoadedList] = field(default_factory=dict)
     running: dict[tuple[bytes, int], ListInstance] = field(default_factory=dict)
-    seldom: bool = False
-    callbacks: list[Any] = field(default_factory=list)
     rows: list[bytes] = field(default_factory=list)
 
 
