@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.families import turning
 from benchmarks.families.growth import four_bars
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.joints.rotation_vector import SERIES_ANGLE, series
 from flexclear.dynamics.joints.rotation_vector import closed as closed_forms
-from flexclear.dynamics.mechanics import closures, flexible, trees
+from flexclear.dynamics.mechanics import closures, flexible, modes, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
 from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
 from flexclear.dynamics.mechanics.of_topology import list_of, mechanism_of
@@ -294,7 +295,8 @@ def test_a_shape_moves_mass_or_rounding(mass: float, sound: float) -> None:
         Inertia(*inertia_parts(np.random.default_rng(6))), none[0], none, [[1.0], [1.0, 1.0 + mass]], [0.0] * 2
     )
     with np.errstate(invalid="ignore"):
-        assert flexible.eliminate(body, [], np.float64(1.0))[-1] == sound
+        given = trees.Resistance(body.I, body.F), body.P, body.m, body.forces, flexible.none_taken(2)
+        assert flexible.eliminate(1, *given, [], np.float64(1.0))[-1] == sound
 
 
 @pytest.mark.parametrize(
@@ -341,6 +343,27 @@ WAYS: dict[str, tuple[str, Any]] = {
     "list of a fifth selection": ("SELECTIONS", 0),
     "straight code": ("SELECTIONS", 4),
 }
+
+
+@pytest.mark.parametrize("number", range(8))
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_shapes_in_blocks_move_as_in_python(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Held shapes, frames on bodies, bodies on these, loops, stiffening; most have blocks of unequal sizes."""
+    monkeypatch.setattr(modes, "FEW", 1)
+    monkeypatch.setattr(modes, "SIZE", 2)
+    assert_alike(evaluated(bent(number)))
+
+
+@pytest.mark.parametrize("case", ["1-clamped-free", "3a"])
+def test_codes_do_not_multiply_with_modes(case: str) -> None:
+    """Bodies of 79 and 280 modes: codes repeat, and are short."""
+    body = turning.CASES[case]()
+    scene = Scene.model_validate(turning.turning(body, 100.0))
+    found = evaluated(tabulate(build(scene, {"rod": turning.reduced(body)})))
+    assert_same(found, *by_numbers(found))
+    codes = list_of(found.model.parts, topology_of(found.model.arrays, found.h)).codes
+    assert len(codes) < 200  # measured 60 to 140
+    assert sum(len(code.program.block) for code in codes) < 50_000  # 25 000; each product once would be a million
 
 
 def by_ways(scene: Scene) -> dict[str, Trajectory]:

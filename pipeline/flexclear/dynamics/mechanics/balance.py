@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
-from flexclear.dynamics.mechanics.evaluation import acted, needed, placed
+from flexclear.dynamics.mechanics.evaluation import acted, placed
 from flexclear.dynamics.mechanics.mechanism import Mechanism
 from flexclear.dynamics.routines.calls import CallList
 
@@ -25,7 +24,7 @@ def balanced(mechanism: Mechanism, multipliers: t.Numbers, calls: CallList) -> N
                 frame.resist(t.pulled(on_body, sizes))
         for link in reversed(mechanism.links):
             if modes := link.modes:
-                on_shapes, link.rest = f.held(needed(link, modes), link.beyond)
+                on_shapes, link.rest = modes.hold(modes.need(link.motion, masses=False), link.beyond)
                 calls.write(modes.rates[len(modes.q) :], on_shapes)
             else:
                 link.rest = t.resist(link.motion, link.body, link.beyond)

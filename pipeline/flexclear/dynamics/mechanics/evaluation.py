@@ -12,7 +12,8 @@ from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
 from flexclear.dynamics.mechanics.loops import Loops, Spread, closed, passed_inwards
-from flexclear.dynamics.mechanics.mechanism import Link, Mechanism, Modes, Rubbing
+from flexclear.dynamics.mechanics.mechanism import Link, Mechanism, Rubbing
+from flexclear.dynamics.mechanics.modes import Block
 from flexclear.dynamics.mechanics.trees import Coordinates
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell, routine
 from flexclear.dynamics.specialise.symbols import select
@@ -56,9 +57,8 @@ def placed(mechanism: Mechanism) -> None:
     mechanism.ground.motion = t.ground(mechanism.gravity)
     for link in mechanism.links:
         link.motion, link.step = t.place(link.kind, *link.frame.placed, link.coordinates)
-        if modes := link.modes:
-            given = modes.held, link.motion, link.step, modes.inboard, *modes.moving
-            link.motion, link.step, modes.twists = f.body_of(*given)
+        if link.modes:
+            link.motion, link.step = link.modes.place(link.motion, link.step)
 
 
 def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
@@ -88,10 +88,7 @@ def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
     for link in reversed(mechanism.links):
         carried_on = int(link.on_link)
         if modes := link.modes:
-            need = needed(link, modes)
-            if slowness:
-                need = need._replace(m=f.stiffened(need.m, modes.stiffness, slowness))
-            modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
+            link.rest, sound = modes.eliminate(modes.need(link.motion), link.beyond, sound, slowness)
         elif link.driven or link.watched:
             link.rest = t.resist(link.motion, link.body, link.beyond)
         if link.driven:
@@ -106,14 +103,6 @@ def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
     return sound
 
 
-def needed(link: Link, modes: Modes) -> f.Need:
-    """Return what a flexible body needs alone."""
-    more: Any = [0.0] * len(modes.q)
-    for station in modes.stations:
-        more = f.bend(more, station, modes.q)
-    return f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
-
-
 def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
     """Compute the accelerations of all links from their forces; store the rates of the state, if there are calls."""
     for link in mechanism.links:
@@ -125,13 +114,8 @@ def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
                 link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
             else:
                 link.changes, link.acceleration = t.accelerate("fixed", Coordinates((), (), ()), *given)
-        if modes := link.modes:
-            on_shapes = modes.gains, modes.forces, link.acceleration
-            if calls:
-                to_modes = modes.basis, modes.body.T, modes.u
-                modes.accelerations = calls.store(modes.rates, f.accelerate, *to_modes, *on_shapes)
-            else:
-                _, modes.accelerations = f.accelerate((), (), (), *on_shapes)
+        if link.modes:
+            link.modes.accelerate(link.acceleration, calls)
 
 
 # Friction of ideal joints ---------------------------------------------------------------------------------------------
@@ -139,7 +123,7 @@ class Influence(NamedTuple):
     """What a bearing does per normal force: L^-1 of its forces by what they move; wrenches on links that are watched,
     and the multipliers of closures; its wrench on the second body at the joint's frame."""
 
-    forces: dict[Link | Modes, t.Numbers]
+    forces: dict[Link | Block, t.Numbers]
     through: dict[Link, Wrench]
     multipliers: dict[int, t.Numbers]
     unit: Wrench
@@ -216,14 +200,14 @@ def loads_of(
     return loads, [bend for _, bends, _ in pressed(loads, 1.0) for bend in bends], jammed
 
 
-def moving(mechanism: Mechanism) -> list[Link | Modes]:
+def moving(mechanism: Mechanism) -> list[Link | Block]:
     """Return all that forces move."""
-    return [moved for link in mechanism.links for moved in (link, link.modes) if moved]
+    return [moved for link in mechanism.links for moved in (link, *(link.modes.blocks if link.modes else ()))]
 
 
 def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
     """Return what bearing k of a joint does per normal force, while all loops stay closed."""
-    forces: dict[Link | Modes, t.Numbers] = {moved: [row[k] for row in V] for moved, V in spread.V.items()}
+    forces: dict[Link | Block, t.Numbers] = {moved: [row[k] for row in V] for moved, V in spread.V.items()}
     right = list[Any]()
     for number, one in loops.found.items():
         rows: c.Rows = [[0.0]] * len(loops.ends[number][0][1])
@@ -235,7 +219,7 @@ def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
     return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
 
 
-def answered(loops: Loops, forces: dict[Link | Modes, t.Numbers], right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
+def answered(loops: Loops, forces: dict[Link | Block, t.Numbers], right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
     """Return the multipliers for right-hand sides, and add their part to forces."""
     multipliers = loops.solved(right)
     for number, one in loops.found.items():
@@ -244,7 +228,7 @@ def answered(loops: Loops, forces: dict[Link | Modes, t.Numbers], right: Sequenc
     return multipliers
 
 
-def respond(mechanism: Mechanism, forces: Mapping[Link | Modes, t.Numbers]) -> None:
+def respond(mechanism: Mechanism, forces: Mapping[Link | Block, t.Numbers]) -> None:
     """Compute the accelerations by forces, given as L^-1 of them, alone."""
     for moved in moving(mechanism):
         moved.forces = forces.get(moved, [0.0] * len(moved.forces))

@@ -42,7 +42,6 @@ from flexclear.dynamics.mechanics.trees import (
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import cos, select, sin
 from flexclear.dynamics.vectors import (
-    AT_REST,
     WITHOUT,
     ZERO,
     Inertia,
@@ -58,6 +57,7 @@ from flexclear.dynamics.vectors import (
 )
 
 Places = Sequence[tuple[int, ...]]
+Vectors = Sequence[Vector]
 
 
 class Shapes(NamedTuple):
@@ -108,40 +108,89 @@ class Station(NamedTuple):
 
 class Need(NamedTuple):
     """What a body needs alone: inertia I and wrench F of its known motion; the same of its shapes: per unit of their
-    accelerations wrenches P and forces m (rows up to the diagonal), and forces of the known motion."""
+    accelerations wrenches P and forces m (rows up to the diagonal), and forces of the known motion.
+
+    sums: over its modes.
+    """
 
     I: Inertia
     F: Wrench
     P: Wrenches
-    m: Rows
+    m: Any
     forces: Numbers
+    sums: Any = ()
 
 
 class Gains(NamedTuple):
-    """Of the shapes' rows of the factor of the mass matrix."""
+    """Of the shapes' rows of the factor of the mass matrix: K, and the block of these shapes themselves."""
 
     L: Rows
     K: Wrenches
 
 
+class Known(NamedTuple):
+    """Known motion of a body, in its axes."""
+
+    R_WB: Matrix
+    omega: Vector
+    alpha: Vector
+    a: Vector
+
+
+class Share(NamedTuple):
+    """Of some modes: E, nine rows, what the moments add to these by the coordinates (P = E + bent) and by the rates
+    (bending), and V."""
+
+    E: Rows
+    bent: Rows
+    bending: Rows
+    V: Rows
+
+
+class Taken(NamedTuple):
+    """What earlier shapes take from the momenta, masses and forces of some shapes, once these are eliminated."""
+
+    P: Wrenches
+    m: Rows
+    forces: Numbers
+
+
 # Displacements --------------------------------------------------------------------------------------------------------
 class Displacement(NamedTuple):
-    """A displacement by modes, its rate, its second rate without modal accelerations, and its derivatives by modes."""
+    """A displacement by modes, its rate, and its second rate without modal accelerations."""
 
-    by: Vector
-    rate: Vector
-    bias: Vector
-    slopes: Sequence[Vector]
-
-
-def displacement(shapes: Shapes, q: Numbers, u: Numbers) -> Displacement:
-    """Return a displacement at modal coordinates and rates."""
-    bent, bending = (curved(shapes.second, by) for by in (q, u))
-    slopes = [s + g for s, g in zip(by_mode(shapes.linear), bent, strict=True)]
-    halfway = [s + 0.5 * g for s, g in zip(by_mode(shapes.linear), bent, strict=True)]
-    return Displacement(weighted(halfway, q), weighted(slopes, u), weighted(bending, u), slopes)
+    by: Vector = ZERO
+    rate: Vector = ZERO
+    bias: Vector = ZERO
 
 
+class Sums(NamedTuple):
+    """Sums over modes: displacement of the first moment; int rho r r^T, of which only the symmetric part counts;
+    D = int rho r r'^T; and int rho r (q'^T G q')^T."""
+
+    moved: Displacement
+    Q: Numbers
+    D: Matrix
+    drift: Matrix
+
+
+@routine
+def displaced(
+    before: Displacement, linear: Rows, bent: Vectors, bending: Vectors, q: Numbers, u: Numbers
+) -> tuple[Displacement, list[Vector]]:
+    """Add the displacement by some modes, and return its derivatives by them; bent, bending: their G q and G u."""
+    both = list(zip(by_mode(linear), bent, strict=True))
+    slopes, halfway = ([s + share * g for s, g in both] for share in (1.0, 0.5))
+    sums = (halfway, q, before.by), (slopes, u, before.rate), (bending, u, before.bias)
+    return Displacement(*(weighted(*one) for one in sums)), slopes
+
+
+def displacement(shapes: Shapes, q: Numbers, u: Numbers) -> tuple[Displacement, list[Vector]]:
+    """Return a displacement at modal coordinates and rates, and its derivatives by modes."""
+    return displaced(Displacement(), shapes.linear, *(curved(shapes.second, by) for by in (q, u)), q, u)
+
+
+@routine
 def curved(second: Sequence[Rows], q: Numbers) -> list[Vector]:
     """Return G q, a vector per mode."""
     return by_mode([[_dot(row, q) for row in form] for form in second]) if second else [ZERO] * len(q)
@@ -188,37 +237,60 @@ def in_modes(basis: Places, T: Numbers, values: Sequence[Any]) -> list[Any]:
 
 
 # Frames ---------------------------------------------------------------------------------------------------------------
-def deformed(held: int, port: Port | Site, p: Numbers, rates: Numbers) -> tuple[Site, Columns]:
-    """Return the site of a port on the deformed body, and its motion there per rate of each shape, in axes of B."""
-    if isinstance(port, Site):  # no shape moves it
-        return port, [AT_REST] * (held + len(p))
-    moved, turned = (displacement(shapes, p, rates) for shapes in (port.moves, port.turns))
+@routine
+def deformed(port: Port, moved: Displacement, turned: Displacement) -> tuple[Site, Matrix]:
+    """Return the site of a port on the deformed body, and T, which maps rates of its rotation vector to turning."""
     R, T, bias = rotation(turned.by, turned.rate, series(dot(turned.by, turned.by)))
     velocity, acceleration = Twist(T @ turned.rate, moved.rate), Twist(bias + T @ turned.bias, moved.bias)
-    columns = [Twist(T @ psi, phi) for psi, phi in zip(turned.slopes, moved.slopes, strict=True)]
-    return Site(port.p_BS + moved.by, R @ port.R_BS, velocity, acceleration), [AT_REST] * held + columns
+    return Site(port.p_BS + moved.by, R @ port.R_BS, velocity, acceleration), T
 
 
 @routine
-def at_port(held: int, motion: Motion, twists: Columns, port: Port, p: Numbers, rates: Numbers) -> Any:
-    """Return the site of a port on the deformed body, and its motion per rate of each shape, about the origin of B.
+def columns_at(motion: Motion, twists: Columns, site: Site, T: Matrix, moves: Vectors, turns: Vectors) -> list[Twist]:
+    """Return the motion of a port about the origin of its body per rate of some shapes.
 
-    twists: of the body frame per rate of each shape.  p, rates: of moving shapes.
+    twists: of the body frame per rate of each shape.  moves, turns: derivatives of the port's displacement and rotation
+    vector by those shapes that move it, which are the last ones.
     """
-    site, columns = deformed(held, port, p, rates)
     R, arm = motion.R_WB, motion.R_WB @ site.p_BS
-    return site, [twist + column.seen(R).at(-arm) for twist, column in zip(twists, columns, strict=True)]
+    columns = [Twist(T @ psi, phi).seen(R).at(-arm) for phi, psi in zip(moves, turns, strict=True)]
+    held = len(twists) - len(columns)
+    return [*twists[:held], *(twist + column for twist, column in zip(twists[held:], columns, strict=True))]
 
 
 @routine
-def body_of(held: int, joint: Motion, step: Step, port: Port | Site, p: Numbers, rates: Numbers) -> Any:
-    """Return the motion of a body from that of its joint's frame, which shapes may move in the body; the step to the
-    body; and the twist of the body per rate of each shape."""
-    site, columns = deformed(held, port, p, rates)
+def at_port(motion: Motion, twists: Columns, port: Port, p: Numbers, rates: Numbers) -> tuple[Site, Columns]:
+    """Return the site of a port on the deformed body, and its motion per rate of each shape (`columns_at`).
+
+    p, rates: of moving shapes.
+    """
+    (moved, moves), (turned, turns) = (displacement(shapes, p, rates) for shapes in (port.moves, port.turns))
+    site, T = deformed(port, moved, turned)
+    return site, columns_at(motion, twists, site, T, moves, turns)
+
+
+@routine
+def placed(joint: Motion, step: Step, site: Site) -> tuple[Motion, Step]:
+    """Return the motion of a body from that of its joint's frame, which is a site on it, and the step to the body."""
     body = carrying(joint, site)
     arm = body.R_WB @ site.p_BS
-    step = Step([s.at(-arm) for s in step.S], step.p_PB - arm)
-    return body, step, [column.seen(body.R_WB).at(-arm) * -1.0 for column in columns]
+    return body, Step([s.at(-arm) for s in step.S], step.p_PB - arm)
+
+
+@routine
+def opposite(twists: Columns) -> list[Twist]:
+    """Return the opposite of twists: of a body frame, by the shapes that move the frame of its joint in the body."""
+    return [twist * -1.0 for twist in twists]
+
+
+@routine
+def body_of(joint: Motion, step: Step, port: Port, p: Numbers, rates: Numbers, still: Columns) -> Any:
+    """Return the motion of a body from that of its joint's frame, which shapes may move in the body; the step to the
+    body; and the twist of the body per rate of each shape. still: per shape a twist that is zero."""
+    (moved, moves), (turned, turns) = (displacement(shapes, p, rates) for shapes in (port.moves, port.turns))
+    site, T = deformed(port, moved, turned)
+    body, step = placed(joint, step, site)
+    return body, step, opposite(columns_at(body, still, site, T, moves, turns))
 
 
 # Elimination ----------------------------------------------------------------------------------------------------------
@@ -231,46 +303,99 @@ def need(
     places: of the moments: row 3k + l, mode of q, mode.  basis: mode and shape of the entries of T.  more: further
     forces that the modes need, of the elastic energy.
     """
-    n, R = len(q), motion.R_WB
-    V, bent = ([[0.0] * n for _ in range(9)] for _ in range(2))
+    bent, bending, V = ([[0.0] * len(q) for _ in range(9)] for _ in range(3))
     for (row, i, j), (position, rate) in zip(places, body.moments, strict=True):
+        bent[row][j] = bent[row][j] + position * q[i]
+        bending[row][j] = bending[row][j] + position * u[i]
         V[row][j] = V[row][j] + rate * u[i]
-        bent[row][j] = bent[row][j] + position * u[i]
-    (P, J), moved = bulk(places, body, q), displacement(body.moves, q, u)
-    D, drift = (Matrix([_dot(row, u) for row in rows]) for rows in (P, bent))
-    spins = [axial(column) for column in zip(*P, strict=True)]
+    share, curves = Share(body.E, bent, bending, V), [curved(body.moves.second, by) for by in (q, u)]
+    sums, slopes = summed(nothing(body.second), share, body.moves.linear, *curves, q, u)
+    known, I, F = whole(motion, body.mass, body.first, body.untilted, sums)
+    forces, spins = on_modes(known, share, slopes, body.stiffness, body.damping, q, u, more)
+    forces, spins = in_shapes(basis, body.T, forces), in_shapes(basis, body.T, spins, ZERO)
+    alone, P, forces = momenta(motion.R_WB, I, F, spins, body.moved, curves[0], twists, forces)
+    return Need(I, F, P, coupled(body.mass_of_shapes, alone, P, twists, twists), forces, sums)
 
+
+def nothing(second: Numbers) -> Sums:
+    """Return the sums over no modes; second: int rho X X^T."""
+    return Sums(Displacement(), second, *[Matrix([0.0] * 9)] * 2)
+
+
+@routine
+def summed(
+    before: Sums, share: Share, linear: Rows, bent: Vectors, bending: Vectors, q: Numbers, u: Numbers
+) -> tuple[Sums, list[Vector]]:
+    """Add the parts of some modes to sums, and return the derivatives of the first moment by these modes.
+
+    The arguments are those of `displaced`, of the first moment.
+    """
+    (moved, slopes), (P, E) = displaced(before.moved, linear, bent, bending, q, u), (momenta_of(share), share.E)
+    Q = [before.Q[r] + _dot(E[3 * (r % 3) + r // 3], q) + _dot(P[r], q) for r in range(9)]
+    both = (before.D, P), (before.drift, share.bending)
+    D, drift = (Matrix([one + _dot(row, u) for one, row in zip(old, rows, strict=True)]) for old, rows in both)
+    return Sums(moved, Q, D, drift), slopes
+
+
+def momenta_of(share: Share) -> list[list[Any]]:
+    """Return P, nine rows."""
+    return [[e + more for e, more in zip(*rows, strict=True)] for rows in zip(share.E, share.bent, strict=True)]
+
+
+@routine
+def whole(motion: Motion, mass: Any, first: Vector, untilted: Symmetric, sums: Sums) -> tuple[Known, Inertia, Wrench]:
+    """Return the motion of a body in its axes, its inertia, and the wrench that the motion needs."""
+    R, D, J, moved = motion.R_WB, sums.D, tensor(sums.Q), sums.moved
     omega, alpha, a = (R.T @ v for v in (motion.omega, motion.alpha, motion.a))
-    c, v = body.first + moved.by, moved.rate
-    force = body.mass * a + cross(alpha, c) + cross(omega, cross(omega, c) + 2.0 * v) + moved.bias
-    moment = cross(c, a) + J @ alpha + cross(omega, J @ omega - body.untilted @ omega) + axial(drift)
+    c, v = first + moved.by, moved.rate
+    force = mass * a + cross(alpha, c) + cross(omega, cross(omega, c) + 2.0 * v) + moved.bias
+    moment = cross(c, a) + J @ alpha + cross(omega, J @ omega - untilted @ omega) + axial(sums.drift)
     moment = moment + 2.0 * ((D[0] + D[4] + D[8]) * omega - D.T @ omega)
-    F, turning = Wrench(R @ moment, R @ force), skew(omega) @ skew(omega)
+    I = Inertia((R @ J @ R.T).symmetric, skew(R @ c), Symmetric([mass] * 3 + [0.0] * 3))
+    return Known(R, omega, alpha, a), I, Wrench(R @ moment, R @ force)
+
+
+@routine
+def on_modes(
+    known: Known, share: Share, slopes: Vectors, stiffness: Numbers, damping: Numbers, q: Numbers, u: Numbers,
+    more: Numbers,
+) -> tuple[list[Any], list[Vector]]:  # fmt: skip
+    """Return the forces that some modes need in the known motion, and int rho r x S of each."""
+    P, turning = momenta_of(share), skew(known.omega) @ skew(known.omega)
+    spins = [axial(column) for column in zip(*P, strict=True)]
     forces = [
-        dot(moved.slopes[j], a) + dot(spins[j], alpha) + _dot(turning, [row[j] for row in P])
-        + 2.0 * dot(axial([row[j] for row in V]), omega) + body.stiffness[j] * q[j] + body.damping[j] * u[j] + more[j]
-        for j in range(n)
+        dot(slopes[j], known.a) + dot(spins[j], known.alpha) + _dot(turning, [row[j] for row in P])
+        + 2.0 * dot(axial([row[j] for row in share.V]), known.omega) + stiffness[j] * q[j] + damping[j] * u[j] + more[j]
+        for j in range(len(q))
     ]  # fmt: skip
+    return forces, spins
 
-    I = Inertia((R @ J @ R.T).symmetric, skew(R @ c), Symmetric([body.mass] * 3 + [0.0] * 3))
-    spins = in_shapes(basis, body.T, spins, ZERO)
-    slopes = [s + g for s, g in zip(by_mode(body.moved), curved(body.moves.second, q), strict=True)]
+
+@routine
+def momenta(
+    R: Matrix, I: Inertia, F: Wrench, spins: Vectors, moved: Rows, bent: Vectors, twists: Columns, forces: Numbers
+) -> tuple[Wrenches, Wrenches, list[Any]]:
+    """Return the momenta per rate of some shapes, alone and with the body that they move, and the forces on them.
+
+    forces: without those of F.
+    """
+    slopes = [s + g for s, g in zip(by_mode(moved), bent, strict=True)]
     alone = [Wrench(R @ spin, R @ slope) for spin, slope in zip(spins, slopes, strict=True)]
-    moving = [momentum + I.of(twist) for momentum, twist in zip(alone, twists, strict=True)]
-    m = [
-        [body.mass_of_shapes[i][j] + alone[i].on(twists[j]) + moving[j].on(twists[i]) for j in range(i + 1)]
-        for i in range(n)
-    ]
-    forces = [one + F.on(twist) for one, twist in zip(in_shapes(basis, body.T, forces), twists, strict=True)]
-    return Need(I, F, moving, m, forces)
+    both = [momentum + I.of(twist) for momentum, twist in zip(alone, twists, strict=True)]
+    return alone, both, [one + F.on(twist) for one, twist in zip(forces, twists, strict=True)]
 
 
-def bulk(places: Places, body: Modal, q: Numbers) -> tuple[Rows, Symmetric]:
-    """Return P, nine rows, and the inertia tensor about the origin of the body; places: see `need`."""
-    P = [list(row) for row in body.E]
-    for (row, i, j), (position, _) in zip(places, body.moments, strict=True):
-        P[row][j] = P[row][j] + position * q[i]
-    return P, tensor([body.second[r] + _dot(body.E[3 * (r % 3) + r // 3], q) + _dot(P[r], q) for r in range(9)])
+@routine
+def coupled(mass: Rows, alone: Wrenches, momenta: Wrenches, twists: Columns, others: Columns) -> list[list[Any]]:
+    """Return a block of the mass matrix of shapes; of a diagonal block, as of `mass`, the rows up to the diagonal.
+
+    alone, twists: of the shapes of its rows.  momenta, others: of its columns, with the body that these move.
+    """
+    made = []
+    for row, momentum, twist in zip(mass, alone, twists, strict=False):
+        columns = zip(row, momenta, others, strict=False)
+        made.append([one + momentum.on(other) + moving.on(twist) for one, moving, other in columns])
+    return made
 
 
 def tensor(Q: Numbers) -> Symmetric:
@@ -284,28 +409,46 @@ def axial(M: Numbers) -> Vector:
     return Vector([M[5] - M[7], M[6] - M[2], M[1] - M[3]])
 
 
-def section(station: Station, q: Numbers) -> tuple[Vector, Vector, Any, Any, Vector]:
-    """Return rotation and curvature at a station, cosine and sine of its twist, and the strain in twisted axes."""
-    theta, kappa = (weighted(by_mode(rows), q) for rows in (station.rotation, station.curvature))
+@routine
+def curvature(theta: Vector, kappa: Vector, station: Station, q: Numbers) -> tuple[Vector, Vector]:
+    """Add the parts of some modes to rotation and curvature at a station."""
+    return weighted(by_mode(station.rotation), q, theta), weighted(by_mode(station.curvature), q, kappa)
+
+
+def strained(theta: Vector, kappa: Vector) -> tuple[Any, Any, Vector]:
+    """Return cosine and sine of the twist of a section, and its strain in twisted axes."""
     c, s = cos(theta[0]), sin(theta[0])
     twist = kappa[0] - 0.5 * (theta[1] * kappa[2] - theta[2] * kappa[1])
-    return theta, kappa, c, s, Vector([twist, c * kappa[1] + s * kappa[2], c * kappa[2] - s * kappa[1]])
+    return c, s, Vector([twist, c * kappa[1] + s * kappa[2], c * kappa[2] - s * kappa[1]])
 
 
 @routine
-def bend(forces: Numbers, station: Station, q: Numbers) -> list[Any]:
-    """Add the forces of a rod's elastic energy beyond that of its modal stiffness, at a station, to those on modes.
+def resisting(stiffness: Symmetric, theta: Vector, kappa: Vector) -> tuple[Vector, Vector]:
+    """Return what a rod's section resists beyond the modal stiffness, per rotation and per curvature.
 
     Rods resist bending in the axes of their twisted sections, and bending across bending twists them.
     """
-    theta, kappa, c, s, strain = section(station, q)
-    torque, m2, m3 = station.stiffness @ strain
+    c, s, strain = strained(theta, kappa)
+    torque, m2, m3 = stiffness @ strain
     half = 0.5 * torque
     on_rotation = Vector([m2 * strain[2] - m3 * strain[1], -half * kappa[2], half * kappa[1]])
     on_curvature = Vector([torque, c * m2 - s * m3 + half * theta[2], s * m2 + c * m3 - half * theta[1]])
-    on_curvature = on_curvature - station.stiffness @ kappa
+    return on_rotation, on_curvature - stiffness @ kappa
+
+
+@routine
+def bent_forces(forces: Numbers, station: Station, on_rotation: Vector, on_curvature: Vector) -> list[Any]:
+    """Add what a section resists to the forces that some modes need."""
     both = zip(forces, by_mode(station.rotation), by_mode(station.curvature), strict=True)
     return [f + dot(on_rotation, turn) + dot(on_curvature, curve) for f, turn, curve in both]
+
+
+@routine
+def bend(forces: Numbers, station: Station, q: Numbers) -> tuple[list[Any], tuple[Vector, Vector]]:
+    """Add the forces of a rod's elastic energy beyond that of its modal stiffness, at a station, to those on modes, and
+    return its rotation and curvature."""
+    section = curvature(ZERO, ZERO, station, q)
+    return bent_forces(forces, station, *resisting(station.stiffness, *section)), section
 
 
 @routine
@@ -315,39 +458,88 @@ def stiffened(mass: Rows, stiffness: Rows, share: float) -> list[Any]:
 
 
 @routine
-def held(body: Need, beyond: Sequence[Beyond]) -> tuple[list[Any], Resistance]:
-    """Return the forces on the shapes of a body that hold them, and what its joint must resist then: a wrench."""
-    F, forces = body.F, list(body.forces)
+def held(first: int, F: Wrench, forces: Numbers, beyond: Sequence[Beyond]) -> tuple[list[Any], Resistance]:
+    """Return the forces on shapes of a body that hold them, and what its joint must resist then: a wrench.
+
+    beyond: its columns are of these shapes; its wrenches are added to F for the `first` ones.
+    """
+    forces = list(forces)
     for (_, wrench), columns in beyond:
-        F = F + wrench
+        F = F + wrench if first else F
         for i, column in enumerate(columns):
             forces[i] = forces[i] + wrench.on(column)
     return forces, Resistance(WITHOUT, F)
 
 
 @routine
-def eliminate(body: Need, beyond: Sequence[Beyond], sound: Any) -> tuple[Gains, list[Any], Resistance, Any]:
-    """Eliminate the shapes of a body from its inertia with all that it carries.
+def eliminate(
+    first: int, rest: Resistance, P: Wrenches, m: Rows, needed: Numbers, taken: Taken, beyond: Sequence[Beyond],
+    sound: Any,
+) -> tuple[Gains, list[Any], Resistance, Any]:  # fmt: skip
+    """Eliminate shapes of a body from what it resists with all that it carries.
 
     Returns their gains; L^-1 of the forces on them; with what the body resists while they move freely; and `sound`,
-    which becomes 0 when a shape moves no mass.
+    which becomes 0 when a shape moves no mass.  beyond: as of `held`.
     """
-    I, F, P, m, needed = body.I, body.F, list(body.P), [list(row) for row in body.m], list(body.forces)
+    (I, F), P, m, needed = rest, list(P), [list(row) for row in m], list(needed)
     for (inertia, wrench), columns in beyond:
-        I, F = I + inertia, F + wrench
+        if first:
+            I, F = I + inertia, F + wrench
         for i, column in enumerate(columns):
             momentum = inertia.of(column)
             P[i], needed[i] = P[i] + momentum, needed[i] + wrench.on(column)
             m[i] = [one + momentum.on(other) for one, other in zip(m[i], columns, strict=False)]
     diagonal = [row[i] for i, row in enumerate(m)]
+    m = [[one - less for one, less in zip(*rows, strict=True)] for rows in zip(m, taken.m, strict=True)]
     _, L, least = c.cholesky(m, diagonal, diagonal, 1.0)
-    forces, K = forward(L, [-one for one in needed]), list[Wrench]()
-    for row, momentum, force in zip(L, P, forces, strict=True):
+    forces = forward(L, [-one - less for one, less in zip(needed, taken.forces, strict=True)])
+    K = list[Wrench]()
+    for row, momentum, less, force in zip(L, P, taken.P, forces, strict=True):
+        momentum = momentum - less
         for factor, k in zip(row, K, strict=False):
             momentum = momentum - k * factor
         K.append(momentum * row[len(K)])
         I, F = I.without(K[-1], 1.0), F + K[-1] * force
     return Gains(L, K), forces, Resistance(I, F), select(least > MASSLESS, sound, 0.0)
+
+
+@routine
+def with_beyond(m: Rows, beyond: Sequence[tuple[Inertia, Columns, Columns]]) -> list[list[Any]]:
+    """Return a block of the mass matrix of shapes below the diagonal with that of what the body carries.
+
+    beyond: inertias, and the motion of their frames per rate of the shapes of rows and columns.
+    """
+    for inertia, columns, others in beyond:
+        momenta = [inertia.of(column) for column in columns]
+        both = zip(m, momenta, strict=True)
+        m = [[one + momentum.on(other) for one, other in zip(row, others, strict=True)] for row, momentum in both]
+    return list(m)
+
+
+def none_taken(count: int) -> Taken:
+    """Return what no shapes take from `count` others."""
+    return Taken([Wrench(ZERO, ZERO)] * count, [[0.0] * (i + 1) for i in range(count)], [0.0] * count)
+
+
+@routine
+def take(taken: Taken, below: Rows, K: Wrenches, forces: Numbers) -> Taken:
+    """Add what other shapes take; below: of the factor, rows of the shapes from which they take."""
+    P = [
+        sum((k * factor for k, factor in zip(K, row, strict=True)), one)
+        for one, row in zip(taken.P, below, strict=True)
+    ]
+    m = [
+        [one + _dot(row, other) for one, other in zip(rows, below, strict=False)]
+        for rows, row in zip(taken.m, below, strict=True)
+    ]
+    return Taken(P, m, [one + _dot(row, forces) for one, row in zip(taken.forces, below, strict=True)])
+
+
+@routine
+def less(on_shapes: Rows, below: Rows, V: Rows) -> list[list[Any]]:
+    """Return forces on shapes, per row of a closure, less what others take from them."""
+    columns = zip(on_shapes, zip(*V, strict=True), strict=True)
+    return [[f - _dot(row, v) for f, row in zip(forces, below, strict=True)] for forces, v in columns]
 
 
 @routine
@@ -382,8 +574,14 @@ def accelerate(basis: Places, T: Numbers, u: Numbers, gains: Gains, forces: Numb
 
     a: acceleration of the body as if rigid, without the known part.
     """
-    shapes = backward(gains.L, [force - k.on(a) for force, k in zip(forces, gains.K, strict=True)])
+    shapes = accelerations(gains, forces, a)
     return [*u, *in_modes(basis, T, shapes)], shapes
+
+
+@routine
+def accelerations(gains: Gains, forces: Numbers, a: Twist) -> list[Any]:
+    """Return the accelerations of shapes; the arguments are those of `accelerate`."""
+    return backward(gains.L, [force - k.on(a) for force, k in zip(forces, gains.K, strict=True)])
 
 
 @routine
@@ -394,42 +592,37 @@ def follow(a: Twist, columns: Columns, accelerations: Numbers) -> Twist:
 
 @routine
 def energies(
-    places: Places,
-    basis: Places,
-    motion: Motion,
-    body: Modal,
-    q: Numbers,
-    u: Numbers,
-    gravity: Vector,
-    kinetic: Any,
-    potential: Any,
-    elastic: Any,
-) -> tuple[Any, Any, Any]:
-    """Return sums with the kinetic energy of a body, its potential energy of gravity, and that of its modal stiffness.
-
-    The arguments are those of `need`.
-    """
-    (P, J), moved, R, p = (
-        bulk(places, body, q),
-        displacement(body.moves, q, u),
-        motion.R_WB,
-        in_shapes(basis, body.T, u),
-    )
-    omega, v, c = R.T @ motion.omega, R.T @ motion.v, body.first + moved.by
+    motion: Motion, mass: Any, first: Vector, sums: Sums, gravity: Vector, kinetic: Any, potential: Any
+) -> tuple[Any, Any]:
+    """Return sums with the kinetic energy of a body, without that of its shapes' masses, and its potential energy of
+    gravity."""
+    R, J, moved = motion.R_WB, tensor(sums.Q), sums.moved
+    omega, v, c = R.T @ motion.omega, R.T @ motion.v, first + moved.by
     speeding = cross(omega, c) + moved.rate
-    moving = 0.5 * body.mass * dot(v, v) + dot(v, speeding) + 0.5 * dot(omega, J @ omega)
-    moving = moving + dot(omega, axial([_dot(row, u) for row in P]))
-    for i, row in enumerate(body.mass_of_shapes):
-        moving = moving + p[i] * (_dot(row[:i], p[:i]) + 0.5 * row[i] * p[i])
-    bent = 0.5 * _dot(body.stiffness, [one * one for one in q])
-    return kinetic + moving, potential - dot(gravity, body.mass * motion.p_WB + R @ c), elastic + bent
+    moving = 0.5 * mass * dot(v, v) + dot(v, speeding) + 0.5 * dot(omega, J @ omega) + dot(omega, axial(sums.D))
+    return kinetic + moving, potential - dot(gravity, mass * motion.p_WB + R @ c)
 
 
 @routine
-def bending_energy(station: Station, q: Numbers, elastic: Any) -> Any:
+def energy_of_shapes(diagonal: int, mass: Rows, rates: Numbers, others: Numbers, kinetic: Any) -> Any:
+    """Return the sum with the kinetic energy of a block of the mass of shapes, of a `diagonal` one the lower part."""
+    for i, row in enumerate(mass):
+        halves = [0.5 if diagonal and i == j else 1.0 for j in range(len(row))]
+        kinetic = kinetic + rates[i] * sum((h * m * p for h, m, p in zip(halves, row, others, strict=False)), 0.0)
+    return kinetic
+
+
+@routine
+def elastic_energy(stiffness: Numbers, q: Numbers, elastic: Any) -> Any:
+    """Return the sum with the energy of the modal stiffness."""
+    return elastic + 0.5 * _dot(stiffness, [one * one for one in q])
+
+
+@routine
+def bending_energy(stiffness: Symmetric, section: tuple[Vector, Vector], elastic: Any) -> Any:
     """Return the sum with a rod's elastic energy beyond that of its modal stiffness, at a station; see `bend`."""
-    _, kappa, _, _, strain = section(station, q)
-    return elastic + 0.5 * (dot(strain, station.stiffness @ strain) - dot(kappa, station.stiffness @ kappa))
+    _, _, strain = strained(*section)
+    return elastic + 0.5 * (dot(strain, stiffness @ strain) - dot(section[1], stiffness @ section[1]))
 
 
 @routine

@@ -7,9 +7,9 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from flexclear.dynamics.mechanics import closures as c
-from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
-from flexclear.dynamics.mechanics.mechanism import Closure, Frame, Link, Mechanism, Modes
+from flexclear.dynamics.mechanics.mechanism import Closure, Frame, Link, Mechanism
+from flexclear.dynamics.mechanics.modes import Block, Modes
 from flexclear.dynamics.mechanics.trees import Columns
 from flexclear.dynamics.routines.calls import CallList
 from flexclear.dynamics.vectors import ZERO, Wrench
@@ -21,7 +21,7 @@ Ends = Sequence[tuple[Frame, c.Wrenches]]
 class Spread(NamedTuple):
     """Rows passed from their ends to the ground: V by what they move, and wrenches through joints that are watched."""
 
-    V: dict[Link | Modes, c.Rows]
+    V: dict[Link | Block, c.Rows]
     through: dict[Link, c.Wrenches]
 
 
@@ -44,7 +44,7 @@ class Loops(NamedTuple):
 
 def linked(mechanism: Mechanism, calls: CallList) -> Loops:
     """Pass the rows of all closures to the ground, and factorise their matrix."""
-    found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
+    found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Block, list[int]]()
     numbers, ends = list[int](), dict[int, Ends]()
     for number, one in enumerate(mechanism.closures):
         kept, places = len(one.scales), (frame.placed for frame in one.frames)
@@ -107,9 +107,9 @@ def passed_inwards(
         nonlocal gamma, S
         carried_on = int(link.on_link)
         if modes := link.modes:
-            forces = on_shapes.get(link, [[0.0] * len(modes.forces)] * len(gamma))
-            modal = modes.gains, modes.forces, forces, loads, wrenches, gamma, S
-            found.V[modes], gamma, S, wrenches = f.spread(*modal)
+            forces = on_shapes.get(link, [[0.0] * len(modes.q)] * len(gamma))
+            V, gamma, S, wrenches = modes.spread(forces, loads, wrenches, gamma, S)
+            found.V.update(V)
         if link.driven or link.watched:
             found.through[link] = wrenches
         if not link.gains:
@@ -128,7 +128,7 @@ def jacobian(ends: Ends, *, driven: bool = False) -> dict[Link | Modes, c.Rows]:
 
     def passed(link: Link, wrenches: c.Wrenches, loads: list[tuple[c.Wrenches, Columns]]) -> c.Wrenches:
         if modes := link.modes:
-            found[modes] = c.along([columns for _, columns in loads], [given for given, _ in loads])
+            found[modes] = modes.jacobian(loads)
         if driven or not link.driven:
             found[link] = c.along([link.step.S], [wrenches])
         return c.inwards(link.step, wrenches) if link.on_link else []

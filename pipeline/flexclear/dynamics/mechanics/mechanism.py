@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
+from flexclear.dynamics.mechanics.modes import Modes
 from flexclear.dynamics.mechanics.trees import (
     Beyond,
     Body,
@@ -54,7 +55,7 @@ class Frame:
         if isinstance(self.undeformed, Site):
             return self.undeformed, ()
         modes = self.modes
-        return f.at_port(modes.held, self.carrier.motion, modes.twists, self.undeformed, *modes.moving)
+        return modes.at_port(self.carrier.motion, self.undeformed)
 
     @property
     def modes(self) -> Modes:
@@ -73,7 +74,7 @@ class Frame:
         """The part of the acceleration of its body with the frame that is from unknown rates of speeds."""
         if not self.deformed[1]:
             return self.carrier.acceleration
-        return f.follow(self.carrier.acceleration, self.deformed[1], self.modes.accelerations)
+        return self.modes.follow(self.carrier.acceleration, self.deformed[1])
 
     def resist(self, resistance: Resistance) -> None:
         """Let the body resist, through this frame, what is about the origin of the body."""
@@ -82,39 +83,6 @@ class Frame:
     def push(self, wrench: Wrench) -> None:
         """Apply a wrench, about the origin of the body, to the body and its modes, before these are eliminated."""
         self.resist(t.pushed(wrench))
-
-
-@dataclass(eq=False)
-class Modes:
-    """Modes of a flexible body. Its numbers are in memory.
-
-    inboard: frame of the body's joint on the body.  q, u: coordinates and their rates.  rates: where the rates of these
-    are stored.  places, basis: see `flexible.need`; held: shapes that move no frame.  stations: of a rod that loads
-    stiffen.  stiffness: in shapes, rows up to the diagonal.  book: of the ledger, for the loss.  The others follow as
-    `flexible` has them.
-    """
-
-    inboard: Site | f.Port
-    body: f.Modal
-    q: Cells
-    u: Cells
-    rates: Cells
-    places: f.Places
-    basis: f.Places
-    held: int
-    stations: Sequence[f.Station]
-    stiffness: c.Rows
-    book: int
-    twists: Columns = field(init=False)
-    gains: f.Gains = field(init=False)
-    forces: t.Numbers = field(init=False)
-    accelerations: t.Numbers = field(init=False)
-
-    @cached_property
-    def moving(self) -> tuple[t.Numbers, t.Numbers]:
-        """Coordinates and rates of the moving shapes."""
-        q, u = (f.moving(self.basis, self.body.T, self.held, values) for values in (self.q, self.u))
-        return q, u
 
 
 @dataclass(eq=False)

@@ -13,7 +13,8 @@ from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.evaluation import evaluated
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
-from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
+from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism
+from flexclear.dynamics.mechanics.modes import Modes, split
 from flexclear.dynamics.mechanics.record import describe
 from flexclear.dynamics.mechanics.responses import LISTS, listed
 from flexclear.dynamics.mechanics.tables import Tables
@@ -98,6 +99,16 @@ class _Stretch:
         self.row += count * length
         return [found[length * k : length * (k + 1)] for k in range(count)]
 
+    def lower(self, count: int, full: list[bool]) -> list[list[Any]]:
+        """Return the lower part of the next square matrix; of rows that are not full only the diagonal."""
+        begin = self.row
+        self.row += count * count
+        made = list[list[Any]]()
+        for i in range(count):
+            first = 0 if full[i] else i
+            made.append([0.0] * first + self.tables.row(self.table, begin + count * i + first, i + 1 - first))
+        return made
+
 
 def _second(tables: Tables, numbers: _Stretch, n: int) -> list[Any]:
     """Return the next three forms of n modes; none where loads do not stiffen bodies."""
@@ -119,28 +130,31 @@ def _modes(tables: Tables, k: int) -> Modes:
     n, held, q, u = int(body["n_modes"]), int(body["n_held"]), int(body["q0"]), tables.nq + int(body["c0"])
     inboard = int(table(m.LINKS)["inboard_port"][body["link"]])
     of_body, data = tables.row(m.FLEX_NUMBERS, k), _Stretch(tables, m.FLEX_DATA, body["data0"])
-    linear, E, _, diagonals = (data.rows(count, n) for count in (3, 9, n, 2))
+    linear, E = (data.rows(count, n) for count in (3, 9))
+    data.row += n * n
+    diagonals = data.rows(2, n)
     in_shapes = _Stretch(tables, m.INTERFACE_DATA, body["interface0"])
-    moved, mass, stiffness = in_shapes.rows(3, n), in_shapes.rows(n, n), in_shapes.rows(n, n)
+    moved = in_shapes.rows(3, n)
     # without held shapes, shapes are eigenmodes
-    stiff = [[stiffness[i][j] if i == j or i >= held > 0 else 0.0 for j in range(i + 1)] for i in range(n)]
-    coupled = [int(body["coupled"]) and i >= held for i in range(n)]
+    wanted = [bool(body["coupled"]) and i >= held for i in range(n)], [i >= held > 0 for i in range(n)]
+    mass, stiff = (in_shapes.lower(n, full) for full in wanted)
     first, ends = int(body["moment_row0"]), table(m.MOMENT_ROWS)["end"]
     begin, entries = int(body["moment0"]), range(int(body["basis0"]), int(body["basis0"] + body["n_basis"]))
     rows = np.searchsorted(ends[first : first + 9 * n], np.arange(begin, ends[first + 9 * n - 1]), side="right")
     modes = table(m.MOMENTS)["mode"][begin : begin + len(rows)]
+    pairs = tables.row(m.MOMENT_VALUES, begin, len(rows) if len(split(n)) == 1 else min(len(rows), 1))
     modal = Modal(
         of_body[0], Vector(of_body[1:4]), Matrix(of_body[4:13]), Symmetric(of_body[13:]),
         Shapes(linear, _second(tables, data, n)), E, diagonals[0], diagonals[1],
-        [(whole, alone) for whole, alone in (tables.row(m.MOMENT_VALUES, begin + e) for e in range(len(rows)))],
+        list(zip(pairs[::2], pairs[1::2], strict=True)),
         tables.row(m.BASIS_VALUES, entries.start, len(entries)),
-        moved, [[mass[i][j] if i == j or coupled[i] else 0.0 for j in range(i + 1)] for i in range(n)],
+        moved, mass,
     )  # fmt: skip
     return Modes(
         _port(tables, inboard) if body["inboard"] else _site(tables, m.PORT_NUMBERS, inboard),
         modal, cells(STATE, q, n), cells(STATE, u, n), [*cells(RATES, q, n), *cells(RATES, u, n)],
-        tuple((int(r) // n, int(mode), int(r) % n) for r, mode in zip(rows, modes, strict=True)),
-        tuple((int(mode), int(shape)) for mode, shape in table(m.BASIS)[entries.start : entries.stop]),
+        list(zip((rows // n).tolist(), modes.tolist(), (rows % n).tolist(), strict=True)),
+        table(m.BASIS)[entries.start : entries.stop].tolist(),
         held, _stations(tables, k, n), stiff, int(body["book"]),
     )  # fmt: skip
 

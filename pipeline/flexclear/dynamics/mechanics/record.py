@@ -8,10 +8,10 @@ from typing import Any
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures as c
-from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
 from flexclear.dynamics.mechanics.loops import Loops, jacobian
-from flexclear.dynamics.mechanics.mechanism import Carrier, Link, Mechanism, Modes
+from flexclear.dynamics.mechanics.mechanism import Carrier, Link, Mechanism
+from flexclear.dynamics.mechanics.modes import Modes
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Site
 from flexclear.dynamics.routines.calls import CallList, Cell
@@ -57,7 +57,7 @@ def _frames(tables: Tables, mechanism: Mechanism, calls: CallList) -> None:
 def _whole(carrier: Carrier) -> Twist:
     """Return the part of a body's acceleration that is from unknown rates of speeds, with those of its modes."""
     modes = carrier.modes if isinstance(carrier, Link) else None
-    return f.follow(carrier.acceleration, modes.twists, modes.accelerations) if modes else carrier.acceleration
+    return modes.follow(carrier.acceleration, modes.twists) if modes else carrier.acceleration
 
 
 def _wrenches(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallList) -> None:
@@ -101,10 +101,7 @@ def store_energies(tables: Tables, mechanism: Mechanism, calls: CallList) -> Non
     sums, gravity = defaultdict[int, list[Any]](lambda: [0.0] * 3), Vector(mechanism.gravity)
     for link, of in zip(mechanism.links, component[1:], strict=True):
         if modes := link.modes:
-            given = modes.places, modes.basis, link.motion, modes.body, modes.q, modes.u
-            sums[of] = list(f.energies(*given, gravity, *sums[of]))
-            for station in modes.stations:
-                sums[of][2] = f.bending_energy(station, modes.q, sums[of][2])
+            sums[of] = modes.energies(link.motion, gravity, *sums[of])
         else:
             sums[of][:2] = t.energies(link.motion, link.body, gravity, *sums[of][:2])
     stores = [(m.CONTACTS, "outer", "inner", "touch", ("stored", "bent")), (m.LOADS, "a", "b", "load", ("stored",))]

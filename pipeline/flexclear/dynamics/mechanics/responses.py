@@ -8,7 +8,6 @@ from typing import Any
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures as c
-from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
 from flexclear.dynamics.mechanics.evaluation import (
     REPORTS,
@@ -21,7 +20,8 @@ from flexclear.dynamics.mechanics.evaluation import (
     status,
 )
 from flexclear.dynamics.mechanics.loops import Loops, linked, passed_inwards
-from flexclear.dynamics.mechanics.mechanism import Link, Mechanism, Modes
+from flexclear.dynamics.mechanics.mechanism import Link, Mechanism
+from flexclear.dynamics.mechanics.modes import Block
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell
 from flexclear.dynamics.vectors import ZERO, Wrench
 
@@ -43,7 +43,7 @@ def corrected(mechanism: Mechanism, calls: CallList) -> None:
     loops = factored(mechanism, calls, CLOSING**2)
     closures = [one for one in mechanism.closures if one.scales]
     for of_speeds in (True, False):
-        forces: dict[Link | Modes, t.Numbers] = {}
+        forces: dict[Link | Block, t.Numbers] = {}
         answered(loops, forces, [c.opposite(one.opening if of_speeds else one.residuals) for one in closures])
         respond(mechanism, forces)
         write_changes(mechanism, calls, of_speeds=of_speeds)
@@ -59,7 +59,7 @@ def write_changes(mechanism: Mechanism, calls: CallList, *, of_speeds: bool) -> 
             calls.write(link.rates[: len(x)], t.turned(link.kind, x, link.changes))
         if modes := link.modes:
             half = modes.rates[len(modes.q) :] if of_speeds else modes.rates[: len(modes.q)]
-            calls.write(half, f.in_modes(modes.basis, modes.body.T, modes.accelerations))
+            calls.write(half, modes.in_modes(modes.accelerations))
 
 
 def displaced(mechanism: Mechanism, calls: CallList) -> None:
@@ -75,11 +75,7 @@ def displaced(mechanism: Mechanism, calls: CallList) -> None:
 def released(mechanism: Mechanism, calls: CallList, loops: Loops) -> None:
     """Replace forces on modes, given as rates of their speeds, by the rates that they alone cause; with the power of
     the drives, and its growth as these speed up, in place of the first two books."""
-    forces = {
-        link: [f.in_shapes(modes.basis, modes.body.T, modes.rates[len(modes.q) :])]
-        for link in mechanism.links
-        if (modes := link.modes)
-    }
+    forces = {link: [modes.in_shapes(modes.rates[len(modes.q) :])] for link in mechanism.links if (modes := link.modes)}
     spread, *_ = passed_inwards([], [0.0], forces)
     by = influence(loops, spread, 0, Wrench(ZERO, ZERO))
     respond(mechanism, by.forces)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.routines.calls import (
@@ -26,6 +27,7 @@ from flexclear.dynamics.routines.calls import (
     parted,
 )
 from flexclear.dynamics.specialise import topology as topologies
+from flexclear.dynamics.specialise.dual import product
 from flexclear.dynamics.specialise.symbols import Indexed, leaves, rebuilt
 
 
@@ -48,6 +50,16 @@ class Numbers(CallList):
         for cell, value in zip(into or (), leaves(first), strict=True):
             self._arrays[cell.array][self._place(cell)] = value
         return rest
+
+    def products(
+        self, first: Cell, stride: int, entries: Sequence[np.ndarray], vectors: Sequence[Sequence[Any]], count: int
+    ) -> list[list[Any]]:
+        """Return the products of vectors and a matrix."""
+        (rows, columns, numbers), begin = entries, self._place(first)
+        values = self._arrays[first.array][begin + stride * numbers].astype(float)
+        given = [[self._read(one) if isinstance(one, Cell) else one for one in vector] for vector in vectors]
+        matrix = csr_array((values, (rows, columns)), shape=(count, len(given[0])))
+        return [product(matrix, vector) for vector in given]
 
     def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
         """Return the state after a loop."""

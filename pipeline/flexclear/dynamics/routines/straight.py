@@ -46,6 +46,11 @@ class OneTape(CallList):
         self._stored |= {cell.key: (cell, value) for cell, value in zip(into or (), leaves(first), strict=True)}
         return rest
 
+    @staticmethod
+    def located(numbers: Sequence[Any], stride: int = 1) -> list[Any]:
+        """Return the numbers."""
+        return list(numbers)
+
     def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
         """Record a loop, and return the state after it."""
 
@@ -61,6 +66,8 @@ class OneTape(CallList):
             return Indexed(lambda index: self._tape.write(FLOAT, "load", array, first + index))
         if cell.key in self._stored:
             return self._stored[cell.key][1]
+        if cell.array == RESULTS:
+            return 0.0
         if cell.array == MODES:
             return self._tape.write(INTEGER, "load", "n", self._tape.write(INTEGER, "load", "n", m.MODE) + cell.index)
         return self._tape.write(FLOAT, "load", *_place(cell))
@@ -68,7 +75,8 @@ class OneTape(CallList):
     @property
     def program(self) -> Program:
         """The program of all calls."""
-        stores = [(*_place(cell), value) for cell, value in self._stored.values()]
+        kept = [one for one in self._stored.values() if one[0].array != RESULTS or one[0].index == 0]
+        stores = [(*_place(cell), value) for cell, value in kept]
         return Program(self._tape.block, [*stores, ("n", m.ABRIDGED, 1)])
 
 

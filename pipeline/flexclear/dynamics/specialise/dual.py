@@ -128,3 +128,13 @@ def changes(numbers: Iterable[Any], directions: int) -> np.ndarray:
     nothing = np.zeros(directions)
     rows = [number.change if isinstance(number, Dual) else nothing for number in numbers]
     return np.array(rows).reshape(len(rows), directions).T.copy()
+
+
+def product(matrix: Any, vector: Iterable[Any]) -> list[Any]:
+    """Return the product of a matrix of plain numbers with numbers that may carry changes."""
+    given = list(vector)
+    values = list(matrix @ np.array([value(one) for one in given], dtype=float))
+    directions = next((len(one.change) for one in given if isinstance(one, Dual)), 0)
+    if not directions:
+        return values
+    return [Dual(*one) for one in zip(values, matrix @ changes(given, directions).T, strict=True)]
