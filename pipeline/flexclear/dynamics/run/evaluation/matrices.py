@@ -12,7 +12,8 @@ from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics.balance import balanced
 from flexclear.dynamics.mechanics.evaluation import eliminated, placed
 from flexclear.dynamics.mechanics.loops import Loops, jacobian, linked
-from flexclear.dynamics.mechanics.mechanism import Frame, Link, Modes
+from flexclear.dynamics.mechanics.mechanism import Frame, Link
+from flexclear.dynamics.mechanics.modes import Block, Modes
 from flexclear.dynamics.mechanics.of_topology import mechanism_of
 from flexclear.dynamics.mechanics.record import moving_parts
 from flexclear.dynamics.mechanics.tables import Tables
@@ -33,14 +34,18 @@ UNIT_WRENCHES = [*(Wrench(ZERO, one) for one in UNITS), *(Wrench(one, ZERO) for 
 class Matrices:
     """A mechanism on numbers, its unknown coordinates eliminated; every_row: with all closure rows, not the selected.
 
-    Modes have the interface basis (`bodies.interface`).
+    Modes have the interface basis (`model.interface_basis`).
     """
 
     def __init__(self, engine: Engine, *, every_row: bool = False) -> None:
         self.model, arrays = engine.model, engine.model.arrays
         tables, self.calls = on_numbers(engine, arrays.h if every_row else engine.h)
         self.mechanism, self._rows0 = mechanism_of(tables), tables.table(m.CLOSURES)["kept0"].tolist()
-        self._first = {moved: int(row["c0"]) for moved, row in moving_parts(tables, self.mechanism)}
+        self._first = dict[Link | Modes | Block, int]()
+        for moved, row in moving_parts(tables, self.mechanism):
+            self._first[moved] = int(row["c0"])
+            for block in moved.blocks if isinstance(moved, Modes) else ():
+                self._first[block] = int(row["c0"]) + block.at.start
         self._shape = tables.size(m.N_KEPT_ROWS), arrays.size(m.NV) + arrays.size(m.N_DRIVES)
         with self.calls.building():
             placed(self.mechanism)
@@ -63,11 +68,13 @@ class Matrices:
             fill(k, link, of_joint)
             for i, s in enumerate(S):
                 L[k + i, k : k + i + 1] = [*(K.on(s) for K in of_joint[:i]), 1.0 / link.gains[i].root]
-            if link.modes:
-                first, gains = self._first[link.modes], link.modes.gains
+            for block in link.modes.blocks if link.modes else ():
+                first, gains = self._first[block], block.gains
                 fill(first, link, gains.K)
                 for i, row in enumerate(gains.L):
                     L[first + i, first : first + i + 1] = [*row[:-1], 1.0 / row[-1]]
+                for before, below in block.below.items():
+                    L[first : first + len(below), self._first[before] :][:, : len(below[0])] = below
                 for i, s in enumerate(S):
                     L[k + i, first : first + len(gains.K)] = [K.on(s) for K in gains.K]
         return L
@@ -78,7 +85,7 @@ class Matrices:
         with self.calls.building():
             return linked(self.mechanism, self.calls)
 
-    def dense(self, rows: Mapping[int, Mapping[Link | Modes, c.Rows]]) -> np.ndarray:
+    def dense(self, rows: Mapping[int, Mapping[Any, c.Rows]]) -> np.ndarray:
         """Return numbers of closure rows, which are given by closure and by what they move, (rows, speeds)."""
         full = np.zeros(self._shape)
         for number, by in rows.items():
