@@ -1,7 +1,7 @@
 """Pin in a journal with clearance: a circle in a circle, in the plane normal to the journal's axis.
 
 Axial motion and tilt are constrained as by a planar joint (`held` in scene/clearance), with a force along the
-axis and moments across it at the pin's frame. The contact (`contact.forces`) acts in the middle of
+axis and moments across it at the pin's frame. The contact (`mechanics.contacts`) acts in the middle of
 the bearing, where the two frames are; over-long bearings, which tilting pins touch at both rims, are
 not modelled.
 

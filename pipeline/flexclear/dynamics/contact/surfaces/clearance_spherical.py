@@ -1,6 +1,6 @@
 """Ball in a socket with clearance: the surfaces separate along the line of centres, in space.
 
-Only the contact (`contact.forces`) connects the bodies.
+Only the contact (`mechanics.contacts`) connects the bodies.
 Source: Wang & Wang (2019), eq. (26).
 """
 
