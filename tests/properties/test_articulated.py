@@ -106,6 +106,9 @@ def kinetic_energy(found: Evaluated) -> Callable[[np.ndarray], Any]:
         mechanism = mechanism_of(tables)
         with Numbers(h, f, w, found.space.n, y, int(h[m.SLOPES])).building() as calls:
             placed(mechanism)
+            for link in mechanism.links:
+                if link.modes:
+                    link.modes.need(link.motion, masses=False)  # sums over modes
             store_energies(tables, mechanism, calls)
         return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 

@@ -329,7 +329,7 @@ class Modes:
 
     # Energies ---------------------------------------------------------------------------------------------------------
     def energies(self, motion: t.Motion, gravity: Vector, kinetic: Any, potential: Any, elastic: Any) -> list[Any]:
-        """Return sums with kinetic, potential and elastic energy of the body."""
+        """Return sums with kinetic, potential and elastic energy of the body, whose need is known."""
         p, body = self.in_shapes(self.u), self.body
         kinetic, potential = f.energies(motion, body.mass, body.first, self.sums, gravity, kinetic, potential)
         for i, block in enumerate(self.blocks):
