@@ -116,7 +116,7 @@ def kinetic_energy(found: Evaluated) -> Callable[[np.ndarray], Any]:
             placed(mechanism)
             for link in mechanism.links:
                 if link.modes:
-                    link.modes.need(link.motion, masses=False)
+                    link.modes.need(link.motion, masses=False)  # sums over modes
             store_energies(tables, mechanism, calls)
         return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 

@@ -9,7 +9,7 @@ import pytest
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile.files import PART
-from flexclear.dynamics.mechanics import trees
+from flexclear.dynamics.mechanics import modes, trees
 from flexclear.dynamics.mechanics.of_topology import list_of
 from flexclear.dynamics.mechanics.responses import CLOSING, LISTS
 from flexclear.dynamics.model import selection
@@ -138,6 +138,15 @@ def test_springs_accelerate_as_dense_algebra_says(name: str) -> None:
     if not len(J):
         assert growth == pytest.approx(float(du @ M[nv:] @ a), abs=ROUNDING)
     assert (drive != 0.0) == ("driven" in name)
+
+
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_shapes_in_blocks_respond_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(modes, "FEW", 1)
+    monkeypatch.setattr(modes, "SIZE", 2)
+    for name in ("held shapes in a loop", "stiffened"):
+        test_springs_accelerate_as_dense_algebra_says(name)
+    test_loops_stop_opening_by_the_least_change_in_the_metric("held shapes in a loop")
 
 
 @pytest.mark.parametrize("where", LISTS)

@@ -16,7 +16,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.joints.rotation_vector import SERIES_ANGLE, series
 from flexclear.dynamics.joints.rotation_vector import closed as closed_forms
-from flexclear.dynamics.mechanics import closures, flexible, modes, trees
+from flexclear.dynamics.mechanics import closures, flexible, modes, shapes, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
 from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
 from flexclear.dynamics.mechanics.of_topology import list_of, mechanism_of
@@ -295,8 +295,8 @@ def test_a_shape_moves_mass_or_rounding(mass: float, sound: float) -> None:
         Inertia(*inertia_parts(np.random.default_rng(6))), none[0], none, [[1.0], [1.0, 1.0 + mass]], [0.0] * 2
     )
     with np.errstate(invalid="ignore"):
-        given = trees.Resistance(body.I, body.F), body.P, body.m, body.forces, flexible.none_taken(2)
-        assert flexible.eliminate(1, *given, [], np.float64(1.0))[-1] == sound
+        given = trees.Resistance(body.I, body.F), body.P, body.m, body.forces, shapes.none_taken(2)
+        assert shapes.eliminate(1, *given, [], np.float64(1.0))[-1] == sound
 
 
 @pytest.mark.parametrize(

@@ -26,23 +26,17 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from flexclear.dynamics.joints.rotation_vector import rotation, series
-from flexclear.dynamics.mechanics import closures as c
-from flexclear.dynamics.mechanics.closures import Rows, Wrenches, backward, forward
+from flexclear.dynamics.mechanics.closures import Rows, Wrenches
 from flexclear.dynamics.mechanics.trees import (
-    MASSLESS,
-    Beyond,
     Columns,
     Motion,
     Numbers,
-    Resistance,
     Site,
     Step,
     carrying,
 )
 from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.specialise.symbols import cos, select, sin
 from flexclear.dynamics.vectors import (
-    WITHOUT,
     ZERO,
     Inertia,
     Matrix,
@@ -53,7 +47,6 @@ from flexclear.dynamics.vectors import (
     cross,
     dot,
     skew,
-    total,
 )
 
 Places = Sequence[tuple[int, ...]]
@@ -98,14 +91,6 @@ class Modal(NamedTuple):
     mass_of_shapes: Rows
 
 
-class Station(NamedTuple):
-    """A section of a rod: rotation and curvature per mode, a row per axis; stiffness of twist and bending."""
-
-    rotation: Rows
-    curvature: Rows
-    stiffness: Symmetric
-
-
 class Need(NamedTuple):
     """What a body needs alone: inertia I and wrench F of its known motion; the same of its shapes: per unit of their
     accelerations wrenches P and forces m (rows up to the diagonal), and forces of the known motion.
@@ -119,13 +104,6 @@ class Need(NamedTuple):
     m: Any
     forces: Numbers
     sums: Any = ()
-
-
-class Gains(NamedTuple):
-    """Of the shapes' rows of the factor of the mass matrix: K, and the block of these shapes themselves."""
-
-    L: Rows
-    K: Wrenches
 
 
 class Known(NamedTuple):
@@ -145,14 +123,6 @@ class Share(NamedTuple):
     bent: Rows
     bending: Rows
     V: Rows
-
-
-class Taken(NamedTuple):
-    """What earlier shapes take from the momenta, masses and forces of some shapes, once these are eliminated."""
-
-    P: Wrenches
-    m: Rows
-    forces: Numbers
 
 
 # Displacements --------------------------------------------------------------------------------------------------------
@@ -193,7 +163,7 @@ def displacement(shapes: Shapes, q: Numbers, u: Numbers) -> tuple[Displacement, 
 @routine
 def curved(second: Sequence[Rows], q: Numbers) -> list[Vector]:
     """Return G q, a vector per mode."""
-    return by_mode([[_dot(row, q) for row in form] for form in second]) if second else [ZERO] * len(q)
+    return by_mode([[scalar(row, q) for row in form] for form in second]) if second else [ZERO] * len(q)
 
 
 def by_mode(rows: Iterable[Numbers]) -> list[Vector]:
@@ -206,7 +176,8 @@ def weighted(vectors: Iterable[Any], factors: Iterable[Any], start: Any = ZERO) 
     return sum((factor * vector for vector, factor in zip(vectors, factors, strict=True)), start)
 
 
-def _dot(a: Iterable[Any], b: Iterable[Any]) -> Any:
+def scalar(a: Iterable[Any], b: Iterable[Any]) -> Any:
+    """Return the sum of products."""
     return weighted(a, b, 0.0)
 
 
@@ -293,7 +264,7 @@ def body_of(joint: Motion, step: Step, port: Port, p: Numbers, rates: Numbers, s
     return body, step, opposite(columns_at(body, still, site, T, moves, turns))
 
 
-# Elimination ----------------------------------------------------------------------------------------------------------
+# Inertia --------------------------------------------------------------------------------------------------------------
 @routine
 def need(
     places: Places, basis: Places, motion: Motion, twists: Columns, body: Modal, q: Numbers, u: Numbers, more: Numbers
@@ -331,9 +302,9 @@ def summed(
     The arguments are those of `displaced`, of the first moment.
     """
     (moved, slopes), (P, E) = displaced(before.moved, linear, bent, bending, q, u), (momenta_of(share), share.E)
-    Q = [before.Q[r] + _dot(E[3 * (r % 3) + r // 3], q) + _dot(P[r], q) for r in range(9)]
+    Q = [before.Q[r] + scalar(E[3 * (r % 3) + r // 3], q) + scalar(P[r], q) for r in range(9)]
     both = (before.D, P), (before.drift, share.bending)
-    D, drift = (Matrix([one + _dot(row, u) for one, row in zip(old, rows, strict=True)]) for old, rows in both)
+    D, drift = (Matrix([one + scalar(row, u) for one, row in zip(old, rows, strict=True)]) for old, rows in both)
     return Sums(moved, Q, D, drift), slopes
 
 
@@ -364,7 +335,7 @@ def on_modes(
     P, turning = momenta_of(share), skew(known.omega) @ skew(known.omega)
     spins = [axial(column) for column in zip(*P, strict=True)]
     forces = [
-        dot(slopes[j], known.a) + dot(spins[j], known.alpha) + _dot(turning, [row[j] for row in P])
+        dot(slopes[j], known.a) + dot(spins[j], known.alpha) + scalar(turning, [row[j] for row in P])
         + 2.0 * dot(axial([row[j] for row in share.V]), known.omega) + stiffness[j] * q[j] + damping[j] * u[j] + more[j]
         for j in range(len(q))
     ]  # fmt: skip
@@ -410,187 +381,6 @@ def axial(M: Numbers) -> Vector:
 
 
 @routine
-def curvature(theta: Vector, kappa: Vector, station: Station, q: Numbers) -> tuple[Vector, Vector]:
-    """Add the parts of some modes to rotation and curvature at a station."""
-    return weighted(by_mode(station.rotation), q, theta), weighted(by_mode(station.curvature), q, kappa)
-
-
-def strained(theta: Vector, kappa: Vector) -> tuple[Any, Any, Vector]:
-    """Return cosine and sine of the twist of a section, and its strain in twisted axes."""
-    c, s = cos(theta[0]), sin(theta[0])
-    twist = kappa[0] - 0.5 * (theta[1] * kappa[2] - theta[2] * kappa[1])
-    return c, s, Vector([twist, c * kappa[1] + s * kappa[2], c * kappa[2] - s * kappa[1]])
-
-
-@routine
-def resisting(stiffness: Symmetric, theta: Vector, kappa: Vector) -> tuple[Vector, Vector]:
-    """Return what a rod's section resists beyond the modal stiffness, per rotation and per curvature.
-
-    Rods resist bending in the axes of their twisted sections, and bending across bending twists them.
-    """
-    c, s, strain = strained(theta, kappa)
-    torque, m2, m3 = stiffness @ strain
-    half = 0.5 * torque
-    on_rotation = Vector([m2 * strain[2] - m3 * strain[1], -half * kappa[2], half * kappa[1]])
-    on_curvature = Vector([torque, c * m2 - s * m3 + half * theta[2], s * m2 + c * m3 - half * theta[1]])
-    return on_rotation, on_curvature - stiffness @ kappa
-
-
-@routine
-def bent_forces(forces: Numbers, station: Station, on_rotation: Vector, on_curvature: Vector) -> list[Any]:
-    """Add what a section resists to the forces that some modes need."""
-    both = zip(forces, by_mode(station.rotation), by_mode(station.curvature), strict=True)
-    return [f + dot(on_rotation, turn) + dot(on_curvature, curve) for f, turn, curve in both]
-
-
-@routine
-def bend(forces: Numbers, station: Station, q: Numbers) -> tuple[list[Any], tuple[Vector, Vector]]:
-    """Add the forces of a rod's elastic energy beyond that of its modal stiffness, at a station, to those on modes, and
-    return its rotation and curvature."""
-    section = curvature(ZERO, ZERO, station, q)
-    return bent_forces(forces, station, *resisting(station.stiffness, *section)), section
-
-
-@routine
-def stiffened(mass: Rows, stiffness: Rows, share: float) -> list[Any]:
-    """Return the mass of shapes with a share [s^2] of their stiffness, rows up to the diagonal."""
-    return [[a + share * b for a, b in zip(*rows, strict=True)] for rows in zip(mass, stiffness, strict=True)]
-
-
-@routine
-def held(first: int, F: Wrench, forces: Numbers, beyond: Sequence[Beyond]) -> tuple[list[Any], Resistance]:
-    """Return the forces on shapes of a body that hold them, and what its joint must resist then: a wrench.
-
-    beyond: its columns are of these shapes; its wrenches are added to F for the `first` ones.
-    """
-    forces = list(forces)
-    for (_, wrench), columns in beyond:
-        F = F + wrench if first else F
-        for i, column in enumerate(columns):
-            forces[i] = forces[i] + wrench.on(column)
-    return forces, Resistance(WITHOUT, F)
-
-
-@routine
-def eliminate(
-    first: int, rest: Resistance, P: Wrenches, m: Rows, needed: Numbers, taken: Taken, beyond: Sequence[Beyond],
-    sound: Any,
-) -> tuple[Gains, list[Any], Resistance, Any]:  # fmt: skip
-    """Eliminate shapes of a body from what it resists with all that it carries.
-
-    Returns their gains; L^-1 of the forces on them; with what the body resists while they move freely; and `sound`,
-    which becomes 0 when a shape moves no mass.  beyond: as of `held`.
-    """
-    (I, F), P, m, needed = rest, list(P), [list(row) for row in m], list(needed)
-    for (inertia, wrench), columns in beyond:
-        if first:
-            I, F = I + inertia, F + wrench
-        for i, column in enumerate(columns):
-            momentum = inertia.of(column)
-            P[i], needed[i] = P[i] + momentum, needed[i] + wrench.on(column)
-            m[i] = [one + momentum.on(other) for one, other in zip(m[i], columns, strict=False)]
-    diagonal = [row[i] for i, row in enumerate(m)]
-    m = [[one - less for one, less in zip(*rows, strict=True)] for rows in zip(m, taken.m, strict=True)]
-    _, L, least = c.cholesky(m, diagonal, diagonal, 1.0)
-    forces = forward(L, [-one - less for one, less in zip(needed, taken.forces, strict=True)])
-    K = list[Wrench]()
-    for row, momentum, less, force in zip(L, P, taken.P, forces, strict=True):
-        momentum = momentum - less
-        for factor, k in zip(row, K, strict=False):
-            momentum = momentum - k * factor
-        K.append(momentum * row[len(K)])
-        I, F = I.without(K[-1], 1.0), F + K[-1] * force
-    return Gains(L, K), forces, Resistance(I, F), select(least > MASSLESS, sound, 0.0)
-
-
-@routine
-def with_beyond(m: Rows, beyond: Sequence[tuple[Inertia, Columns, Columns]]) -> list[list[Any]]:
-    """Return a block of the mass matrix of shapes below the diagonal with that of what the body carries.
-
-    beyond: inertias, and the motion of their frames per rate of the shapes of rows and columns.
-    """
-    for inertia, columns, others in beyond:
-        momenta = [inertia.of(column) for column in columns]
-        both = zip(m, momenta, strict=True)
-        m = [[one + momentum.on(other) for one, other in zip(row, others, strict=True)] for row, momentum in both]
-    return list(m)
-
-
-def none_taken(count: int) -> Taken:
-    """Return what no shapes take from `count` others."""
-    return Taken([Wrench(ZERO, ZERO)] * count, [[0.0] * (i + 1) for i in range(count)], [0.0] * count)
-
-
-@routine
-def take(taken: Taken, below: Rows, K: Wrenches, forces: Numbers) -> Taken:
-    """Add what other shapes take; below: of the factor, rows of the shapes from which they take."""
-    P = [
-        sum((k * factor for k, factor in zip(K, row, strict=True)), one)
-        for one, row in zip(taken.P, below, strict=True)
-    ]
-    m = [
-        [one + _dot(row, other) for one, other in zip(rows, below, strict=False)]
-        for rows, row in zip(taken.m, below, strict=True)
-    ]
-    return Taken(P, m, [one + _dot(row, forces) for one, row in zip(taken.forces, below, strict=True)])
-
-
-@routine
-def less(on_shapes: Rows, below: Rows, V: Rows) -> list[list[Any]]:
-    """Return forces on shapes, per row of a closure, less what others take from them."""
-    columns = zip(on_shapes, zip(*V, strict=True), strict=True)
-    return [[f - _dot(row, v) for f, row in zip(forces, below, strict=True)] for forces, v in columns]
-
-
-@routine
-def spread(
-    gains: Gains,
-    forces: Numbers,
-    on_shapes: Rows,
-    loads: Sequence[tuple[Wrenches, Columns]],
-    wrenches: Wrenches,
-    *rows: Any,
-) -> Any:
-    """Eliminate the shapes of a body from the rows of a closure, as `closures.spread` does for the coordinates of its
-    joint.
-
-    on_shapes: forces on the shapes, per row.  loads: wrenches at ports, and the motion of these per rate of each shape;
-    wrenches: all together.
-    """
-    for given, columns in loads:
-        on_shapes = [
-            [f + wrench.on(column) for f, column in zip(row, columns, strict=True)]
-            for row, wrench in zip(on_shapes, given, strict=True)
-        ]
-    V = list(zip(*(forward(gains.L, row) for row in on_shapes), strict=True))
-    for k, row in zip(gains.K, V, strict=True):
-        wrenches = [wrench - k * v for wrench, v in zip(wrenches, row, strict=True)]
-    return V, *c.less(V, forces, *rows), wrenches
-
-
-@routine
-def accelerate(basis: Places, T: Numbers, u: Numbers, gains: Gains, forces: Numbers, a: Twist) -> Any:
-    """Return the rates of the modes' coordinates and of their rates, and the accelerations of the shapes, by L^-T.
-
-    a: acceleration of the body as if rigid, without the known part.
-    """
-    shapes = accelerations(gains, forces, a)
-    return [*u, *in_modes(basis, T, shapes)], shapes
-
-
-@routine
-def accelerations(gains: Gains, forces: Numbers, a: Twist) -> list[Any]:
-    """Return the accelerations of shapes; the arguments are those of `accelerate`."""
-    return backward(gains.L, [force - k.on(a) for force, k in zip(forces, gains.K, strict=True)])
-
-
-@routine
-def follow(a: Twist, columns: Columns, accelerations: Numbers) -> Twist:
-    """Return the acceleration at a port, from that of the body as if rigid, with the part of its shapes."""
-    return a + total(columns, accelerations)
-
-
-@routine
 def energies(
     motion: Motion, mass: Any, first: Vector, sums: Sums, gravity: Vector, kinetic: Any, potential: Any
 ) -> tuple[Any, Any]:
@@ -615,17 +405,10 @@ def energy_of_shapes(diagonal: int, mass: Rows, rates: Numbers, others: Numbers,
 @routine
 def elastic_energy(stiffness: Numbers, q: Numbers, elastic: Any) -> Any:
     """Return the sum with the energy of the modal stiffness."""
-    return elastic + 0.5 * _dot(stiffness, [one * one for one in q])
-
-
-@routine
-def bending_energy(stiffness: Symmetric, section: tuple[Vector, Vector], elastic: Any) -> Any:
-    """Return the sum with a rod's elastic energy beyond that of its modal stiffness, at a station; see `bend`."""
-    _, _, strain = strained(*section)
-    return elastic + 0.5 * (dot(strain, stiffness @ strain) - dot(section[1], stiffness @ section[1]))
+    return elastic + 0.5 * scalar(stiffness, [one * one for one in q])
 
 
 @routine
 def damping_power(damping: Numbers, u: Numbers) -> Any:
     """Return the power that is lost to damping [W]."""
-    return _dot(damping, [rate * rate for rate in u])
+    return scalar(damping, [rate * rate for rate in u])

@@ -109,7 +109,8 @@ def passed_inwards(
         if modes := link.modes:
             forces = on_shapes.get(link, [[0.0] * len(modes.q)] * len(gamma))
             V, gamma, S, wrenches = modes.spread(forces, loads, wrenches, gamma, S)
-            found.V.update(V)
+            for block, rows in V.items():
+                found.V[block] = rows
         if link.driven or link.watched:
             found.through[link] = wrenches
         if not link.gains:

@@ -1,4 +1,4 @@
-"""Modes of a flexible body in a mechanism: calls of the routines of `flexible`, block of shapes after block.
+"""Modes of a flexible body in a mechanism: calls of the routines of `flexible`, block after block of shapes.
 
 A body with few modes is one block, and most of what it needs is one call. With more, code for all products of modes
 would have no end. So sums over modes are passed on from block to block, products with matrices are calls for some
@@ -18,6 +18,8 @@ import numpy as np
 
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import flexible as f
+from flexclear.dynamics.mechanics import sections as s
+from flexclear.dynamics.mechanics import shapes as e
 from flexclear.dynamics.mechanics import trees as t
 from flexclear.dynamics.routines.calls import CallList, Cell, products
 from flexclear.dynamics.specialise.symbols import leaves
@@ -36,7 +38,7 @@ class Block:
     """
 
     at: slice
-    gains: f.Gains = field(init=False)
+    gains: e.Gains = field(init=False)
     forces: t.Numbers = field(init=False)
     accelerations: t.Numbers = field(init=False)
     below: dict[Block, c.Rows] = field(init=False, default_factory=dict)
@@ -60,7 +62,7 @@ class Modes:
     places: f.Places
     basis: f.Places
     held: int
-    stations: Sequence[f.Station]
+    stations: Sequence[s.Station]
     stiffness: c.Rows
     book: int
     blocks: list[Block] = field(init=False)
@@ -162,7 +164,7 @@ class Modes:
         """Return the acceleration of a frame by its columns, from that of the body as if rigid."""
         for block in self.blocks:
             if not nothing(columns[block.at]):
-                acceleration = f.follow(acceleration, columns[block.at], block.accelerations)
+                acceleration = e.follow(acceleration, columns[block.at], block.accelerations)
         return acceleration
 
     # Elimination ------------------------------------------------------------------------------------------------------
@@ -183,16 +185,16 @@ class Modes:
         more, sections = [0.0] * len(self.q), list[Any]()
         for station in self.stations:
             if self.one:
-                more, section = f.bend(more, station, self.q)
+                more, section = s.bend(more, station, self.q)
             else:
-                section, parts = (ZERO, ZERO), list[f.Station]()
+                section, parts = (ZERO, ZERO), list[s.Station]()
                 for at in (block.at for block in self.blocks):
-                    rows = (columns(one, at) for one in (station.rotation, station.curvature))
-                    parts.append(f.Station(*rows, station.stiffness))
-                    section = f.curvature(*section, parts[-1], self.q[at])
-                resisted = f.resisting(station.stiffness, *section)
+                    turning, bending = (columns(one, at) for one in (station.rotation, station.curvature))
+                    parts.append(s.Station(turning, bending, station.stiffness))
+                    section = s.curvature(*section, parts[-1], self.q[at])
+                resisted = s.resisting(station.stiffness, *section)
                 both = zip(self.blocks, parts, strict=True)
-                more = [one for block, part in both for one in f.bent_forces(more[block.at], part, *resisted)]
+                more = [one for block, part in both for one in s.bent_forces(more[block.at], part, *resisted)]
             sections.append(section)
         return more, sections
 
@@ -241,7 +243,7 @@ class Modes:
         """Return the forces on the shapes that hold them, and what the body's joint must resist then."""
         forces, rest = list[Any](), t.Resistance(need.I, need.F)
         for i, block in enumerate(self.blocks):
-            made, rest = f.held(int(i == 0), rest.F, need.forces[block.at], _of(block, beyond))
+            made, rest = e.held(int(i == 0), rest.F, need.forces[block.at], _of(block, beyond))
             forces += made
         return forces, rest
 
@@ -254,14 +256,14 @@ class Modes:
         """
         rest = t.Resistance(need.I, need.F)
         for i, block in enumerate(self.blocks):
-            taken = f.none_taken(len(need.forces[block.at]))
+            taken = e.none_taken(len(need.forces[block.at]))
             for k, before in enumerate(self.blocks[:i]):
                 rows = self._factor(need.m, i, k, beyond, slowness)
                 if rows:
                     block.below[before] = rows
-                    taken = f.take(taken, rows, before.gains.K, before.forces)
+                    taken = e.take(taken, rows, before.gains.K, before.forces)
             given = need.P[block.at], self._mass(need.m, i, i, slowness), need.forces[block.at], taken
-            made = f.eliminate(int(i == 0), rest, *given, _of(block, beyond), sound)
+            made = e.eliminate(int(i == 0), rest, *given, _of(block, beyond), sound)
             block.gains, block.forces, rest, sound = made
         return rest, sound
 
@@ -273,7 +275,7 @@ class Modes:
         stiffness = columns(self.stiffness[one], other)
         if nothing(stiffness):
             return rows
-        return f.stiffened(rows or [[0.0] * len(row) for row in stiffness], stiffness, slowness)
+        return e.stiffened(rows or [[0.0] * len(row) for row in stiffness], stiffness, slowness)
 
     def _factor(
         self, m: dict[tuple[int, int], Any], i: int, k: int, beyond: Sequence[t.Beyond], slowness: float
@@ -287,7 +289,7 @@ class Modes:
         if not rows and not both and not less:
             return ()
         rows = rows or [[0.0] * len(before.forces)] * (block.at.stop - block.at.start)
-        rows = f.with_beyond(rows, both) if both else rows
+        rows = e.with_beyond(rows, both) if both else rows
         for one in less:
             rows = c.eliminated(rows, block.below[one], before.below[one])
         return () if nothing(rows) else c.below(rows, before.gains.L)
@@ -300,9 +302,9 @@ class Modes:
         for block in self.blocks:
             forces = columns(on_shapes, block.at)
             for before, below in block.below.items():
-                forces = f.less(forces, below, V[before])
+                forces = e.less(forces, below, V[before])
             mine = [(given, motions[block.at]) for given, motions in loads]
-            made = f.spread(block.gains, block.forces, forces, mine, wrenches, gamma, S)
+            made = e.spread(block.gains, block.forces, forces, mine, wrenches, gamma, S)
             V[block], gamma, S, wrenches = made
         return V, gamma, S, wrenches
 
@@ -316,20 +318,20 @@ class Modes:
         """Find the accelerations of all shapes; store the rates of the modes, if there are calls."""
         if (one := self.one) and calls:
             given = self.basis, self.body.T, self.u, one.gains, one.forces, a
-            one.accelerations = calls.store(self.rates, f.accelerate, *given)
+            one.accelerations = calls.store(self.rates, e.accelerate, *given)
             return
         for i, block in reversed(list(enumerate(self.blocks))):
             forces = block.forces
             for later in self.blocks[i + 1 :]:
                 if block in later.below:
                     forces = c.minus_transposed(forces, later.below[block], later.accelerations)
-            block.accelerations = f.accelerations(block.gains, forces, a)
+            block.accelerations = e.accelerations(block.gains, forces, a)
         if calls:
             calls.write(self.rates, [*self.u, *self.in_modes(self.accelerations)])
 
     # Energies ---------------------------------------------------------------------------------------------------------
     def energies(self, motion: t.Motion, gravity: Vector, kinetic: Any, potential: Any, elastic: Any) -> list[Any]:
-        """Return sums with kinetic, potential and elastic energy of the body."""
+        """Return sums with kinetic, potential and elastic energy of the body, whose need is known."""
         p, body = self.in_shapes(self.u), self.body
         kinetic, potential = f.energies(motion, body.mass, body.first, self.sums, gravity, kinetic, potential)
         for i, block in enumerate(self.blocks):
@@ -339,7 +341,7 @@ class Modes:
                     kinetic = f.energy_of_shapes(int(i == k), mass, p[block.at], p[other.at], kinetic)
             elastic = f.elastic_energy(body.stiffness[block.at], self.q[block.at], elastic)
         for station, section in zip(self.stations, self.sections, strict=True):
-            elastic = f.bending_energy(station.stiffness, section, elastic)
+            elastic = s.bending_energy(station.stiffness, section, elastic)
         return [kinetic, potential, elastic]
 
 

@@ -12,11 +12,12 @@ from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.evaluation import evaluated
-from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
+from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism
 from flexclear.dynamics.mechanics.modes import Modes, split
 from flexclear.dynamics.mechanics.record import describe
 from flexclear.dynamics.mechanics.responses import LISTS, listed
+from flexclear.dynamics.mechanics.sections import Station
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
 from flexclear.dynamics.routines.calls import RATES, STATE, CallList, Cell, cells

@@ -209,10 +209,10 @@ class CallList:
                 part = slice(k, min(k + MOST, len(columns)))
                 given = [self.located([vector[one] for one in columns[part]]) for vector in vectors]
                 for group in groups:
-                    values = [self.located(numbers[part], stride) for _, numbers in group]
+                    factors = [self.located(numbers[part], stride) for _, numbers in group]
                     places = [place for place, _ in group]
                     before = places if k else [[0.0] * len(sums)] * len(group)
-                    self.call(_increased, (part.stop - k, stride, before, values, given), leaves(places))
+                    self.call(_increased, (part.stop - k, stride, before, factors, given), leaves(places))
         return sums
 
     def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:

@@ -56,7 +56,7 @@ class Numbers(CallList):
     ) -> list[list[Any]]:
         """Return the products of vectors and a matrix."""
         (rows, columns, numbers), begin = entries, self._place(first)
-        values = self._arrays[first.array][begin + stride * numbers].astype(float)
+        values = self._arrays[first.array][begin + stride * numbers]
         given = [[self._read(one) if isinstance(one, Cell) else one for one in vector] for vector in vectors]
         matrix = csr_array((values, (rows, columns)), shape=(count, len(given[0])))
         return [product(matrix, vector) for vector in given]

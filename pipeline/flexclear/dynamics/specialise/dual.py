@@ -133,7 +133,7 @@ def changes(numbers: Iterable[Any], directions: int) -> np.ndarray:
 def product(matrix: Any, vector: Iterable[Any]) -> list[Any]:
     """Return the product of a matrix of plain numbers with numbers that may carry changes."""
     given = list(vector)
-    values = list(matrix @ np.array([value(one) for one in given], dtype=float))
+    values = list(matrix @ np.array([value(one) for one in given], dtype=matrix.dtype))
     directions = next((len(one.change) for one in given if isinstance(one, Dual)), 0)
     if not directions:
         return values
