@@ -33,6 +33,7 @@ def closure(rows: Sequence[tuple[int, int, int]], kept: int, a: tuple[Motion, Si
     wrenches on the bodies of a and b about the origins of these.
 
     a, b: body and site of the frames of the joint that closes the loop.  rows: see `row`.
+    Source: Wang & Wang (2019), eqs. (30), (31), of prismatic joints and balls.
     """
     A, B = carried(*a), carried(*b)
     made = [row(A, B, *one) for one in rows]

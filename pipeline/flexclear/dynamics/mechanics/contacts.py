@@ -57,6 +57,7 @@ def touch(
 
     laws: form of its normal force, friction law or "".  worn: 1 with wear, else 0.  closed: 1 where the surfaces touch.
     bristle: deflection, in axes of the outer frame, of a law that has some.  ends: of the outer and the inner surface.
+    Source: Wang & Wang (2019), eqs. (23), (24).
     """
     A, B = (carried(*end) for end in ends)
     p = B.p_WB - A.p_WB

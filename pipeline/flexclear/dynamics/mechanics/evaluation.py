@@ -37,7 +37,10 @@ REPORTS = (m.OK, m.JAMMED, m.SINGULAR, m.NOT_POSITIVE)
 
 def evaluated(mechanism: Mechanism, calls: CallList) -> Loops:
     """Append the calls that store the rates of the state, and what steps read besides: contacts, bearings and kinks of
-    loads, residuals of the loops, and the independence of their rows. Return the loops."""
+    loads, residuals of the loops, and the independence of their rows. Return the loops.
+
+    Source: Wang & Wang (2019), eqs. (32), (34).
+    """
     with calls.building():
         placed(mechanism)
         supplied = acted(mechanism, calls)

@@ -233,7 +233,7 @@ def columns_at(motion: Motion, twists: Columns, site: Site, T: Matrix, moves: Ve
 def at_port(motion: Motion, twists: Columns, port: Port, p: Numbers, rates: Numbers) -> tuple[Site, Columns]:
     """Return the site of a port on the deformed body, and its motion per rate of each shape (`columns_at`).
 
-    p, rates: of moving shapes.
+    p, rates: of moving shapes.  Source: Wang & Wang (2019), eqs. (2), (7), (8).
     """
     (moved, moves), (turned, turns) = (displacement(shapes, p, rates) for shapes in (port.moves, port.turns))
     site, T = deformed(port, moved, turned)
@@ -315,7 +315,10 @@ def momenta_of(share: Share) -> list[list[Any]]:
 
 @routine
 def whole(motion: Motion, mass: Any, first: Vector, untilted: Symmetric, sums: Sums) -> tuple[Known, Inertia, Wrench]:
-    """Return the motion of a body in its axes, its inertia, and the wrench that the motion needs."""
+    """Return the motion of a body in its axes, its inertia, and the wrench that the motion needs.
+
+    Source: Wang & Wang (2019), eqs. (9), (14), (15).
+    """
     R, D, J, moved = motion.R_WB, sums.D, tensor(sums.Q), sums.moved
     omega, alpha, a = (R.T @ v for v in (motion.omega, motion.alpha, motion.a))
     c, v = first + moved.by, moved.rate
@@ -331,7 +334,10 @@ def on_modes(
     known: Known, share: Share, slopes: Vectors, stiffness: Numbers, damping: Numbers, q: Numbers, u: Numbers,
     more: Numbers,
 ) -> tuple[list[Any], list[Vector]]:  # fmt: skip
-    """Return the forces that some modes need in the known motion, and int rho r x S of each."""
+    """Return the forces that some modes need in the known motion, and int rho r x S of each.
+
+    Source: Wang & Wang (2019), eqs. (9), (14), (15).
+    """
     P, turning = momenta_of(share), skew(known.omega) @ skew(known.omega)
     spins = [axial(column) for column in zip(*P, strict=True)]
     forces = [
