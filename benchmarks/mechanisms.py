@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from unittest.mock import patch
 
 import numpy as np
 import xarray as xr
@@ -13,7 +12,7 @@ import xarray as xr
 from benchmarks.timing import once
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.integrate import recording
-from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
+from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of, observe_run
@@ -42,9 +41,10 @@ class Mechanism:
         return engine_of(self.scene, self.bundles, silent)
 
     def general_engine(self) -> Engine:
-        """Return the engine with the kernels for every topology, which scenes too long for specialised code use."""
-        with patch.object(specialised_code, "INTERPRETED", True):
-            return self.engine()
+        """Return the engine whose steps run a list of calls, as those of scenes too long for straight code do."""
+        engine = self.engine()
+        engine.specialised.addresses[engine.selected.tobytes()] = 0
+        return engine
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:
         """Return a mechanism with an edited scene and the bundles of this one."""

@@ -92,7 +92,7 @@ def _grown(what: str, grown: Mapping[Case, Mechanism]) -> Measured:
             here.general_engine(), max(EVALUATIONS // (case.of if what == "loops" else 4), 10)
         )
         engine = here.engine() if what != "loops" else None
-        if engine is not None and engine.has_specialised_code:
+        if engine is not None:
             tasks[f"{case.name}, straight"] = _evaluation(engine, EVALUATIONS // 4)
         if engine is not None and what == "modes":
             arrays = engine.model.arrays

@@ -63,7 +63,7 @@ def _of_chain(name: str, links: int) -> Record:
 def _times(peer: Peer, engine: Engine, straight: Engine, state: State, repeat: int) -> Record:
     """Return the times of one evaluation by peer, kernels and, where it exists, specialised code, with their ratios."""
     tasks = {"theirs": partial(peer.time, repeat), "ours": partial(evaluation_time, engine, state, repeat)}
-    if straight.has_specialised_code:
+    if straight.specialised.addresses.get(straight.selected.tobytes(), 1):
         tasks["straight"] = partial(evaluation_time, straight, state, repeat)
     times = interleaved(tasks, ROUNDS)
     return {

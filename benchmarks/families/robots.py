@@ -21,7 +21,7 @@ from benchmarks.page import Columns, short, table
 from flexclear.artifacts.quantities import evaluate
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.run.evaluation import closure_rows
-from flexclear.dynamics.run.evaluation.tree_factor import bias, mass_factor
+from flexclear.dynamics.run.evaluation.matrices import Matrices, holding_forces
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import scene_of
 from flexclear.scene.schema import Scene
@@ -111,7 +111,7 @@ def equations(robot: Robot, written: dict[str, Any], poses: int) -> Record:
 
     model, data = robot.model, mujoco.MjData(robot.model)
     gears = [(gear["first"], gear["second"]) for name, gear in written.get("gear", {}).items() if "rotor" in name]
-    engine = Mechanism("open", opened(written), {}).general_engine()
+    engine = Mechanism("open", opened(written), {}).engine()
     joints, rng, apart = coordinates(robot), np.random.default_rng(48), np.zeros(3)
     for _ in range(poses):
         q, v = np.array(model.qpos0), rng.normal(size=model.nv)
@@ -126,8 +126,8 @@ def equations(robot: Robot, written: dict[str, Any], poses: int) -> Record:
             closure_rows.evaluate(engine, y, 0.0)
             data.qpos[:], data.qvel[:] = q, motion
             mujoco.mj_forward(model, data)
-            forces.append((S.T @ bias(engine), np.array(data.qfrc_bias)))
-        L, M = mass_factor(engine), np.zeros((model.nv, model.nv))
+            forces.append((S.T @ holding_forces(engine)[0], np.array(data.qfrc_bias)))
+        L, M = Matrices(engine).factor, np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, M)
         pairs = [(S.T @ (L @ L.T) @ S, M), forces[0], forces[1]]
         apart = np.maximum(apart, [np.abs(a - b).max() / max(np.abs(b).max(), 1e-300) for a, b in pairs])

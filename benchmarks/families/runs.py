@@ -30,7 +30,7 @@ from benchmarks.page import Columns, short, spread, table
 from benchmarks.processes import as_installed
 from benchmarks.timing import interleaved, of_children, once
 from flexclear import dynamics
-from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.model.merge import frames_of, merge
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.trajectory import integrate
@@ -116,9 +116,8 @@ def _first_run(scene: str, folder: Path) -> Record:
 
     run(folder / "before")
     cold, warm = run(kernels), run(kernels)
-    for name in (SPECIALISED, WHOLE, DESCRIBED):
-        for file in kernels.rglob(f"flexclear_{name}_*"):
-            file.unlink()
+    for file in kernels.rglob(f"flexclear_{SPECIALISED}_*"):
+        file.unlink()
     other = run(kernels)
     return {
         "processors": cores(),

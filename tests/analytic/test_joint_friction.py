@@ -5,17 +5,19 @@ Mechanisms without loops stand side by side in one scene, so that one set of ker
 
 from functools import cache
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
-from flexclear.dynamics import memory as m
 from flexclear.dynamics.effects.joint_friction import BALL
-from flexclear.dynamics.equations.joint_friction import eliminate, find_loads
-from flexclear.dynamics.specialise import dual
+from flexclear.dynamics.mechanics.bearings import solution
+from flexclear.dynamics.mechanics.evaluation import loads_of
+from flexclear.dynamics.routines.calls import CallList
+from flexclear.dynamics.specialise import symbols
+from flexclear.dynamics.vectors import UNIT, ZERO, Vector, Wrench
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError
 from tests.analytic.mechanism_runs import run
@@ -248,14 +250,12 @@ def test_friction_that_takes_load_off_is_what_it_grows_to_not_another_solution()
 
 def test_strides_begin_afresh_where_newtons_method_ends_nowhere() -> None:
     """N = |N - 1| + 1/2: at 3/2, the load without friction, the slopes are singular; the solution is 3/4."""
-    part = [SimpleNamespace(moment=(0.0, 0.0, 0.0), force=(x, 0.0, 0.0)) for x in (-1.0, 1.0)]
-    d = SimpleNamespace(n_bearings=1, reactions=part, bearing=[SimpleNamespace(load=0.0)], evaluation=m.OK)
-    d.bearings, d.bearing_numbers = [SimpleNamespace(joint=0, kind=BALL)], [SimpleNamespace(preload=0.5)]
-    d.bearing_slopes, d.bearing_residuals, d.search = np.zeros(1), np.zeros(1), [SimpleNamespace()]
+    smooth, part = (Wrench(ZERO, Vector([np.float64(x), 0.0, 0.0])) for x in (-1.0, 1.0))
+    ball = SimpleNamespace(kind=BALL), SimpleNamespace(preload=0.5), UNIT
     with np.errstate(all="ignore"):
-        dual.plain(find_loads)(d)
-    assert d.evaluation == m.OK
-    assert d.bearing[0].load == pytest.approx(0.75, rel=1e-12)  # Newton's method ends at 1e-13
+        loads, _, jammed = loads_of([ball], [smooth], [[part]], cast("CallList", symbols))
+    assert not jammed
+    assert loads == pytest.approx([0.75], rel=1e-12)  # Newton's method ends at 1e-13
 
 
 def test_friction_that_jams_on_the_way_is_named_there() -> None:
@@ -268,14 +268,14 @@ def test_friction_that_jams_on_the_way_is_named_there() -> None:
 
 def test_the_loads_equations_are_solved_with_the_sign_of_their_determinant() -> None:
     """Of equations whose largest entries are off the diagonal, as under strong friction; and of singular ones."""
-    solve, random = dual.plain(eliminate), np.random.default_rng(3)
+    random = np.random.default_rng(3)
     for size in (1, 2, 3, 5, 5, 5):
         A, b = random.normal(size=(size, size)), random.normal(size=size)
-        entries, found = A.ravel().copy(), b.copy()
-        assert solve(entries, found, size) == np.sign(np.linalg.det(A))
+        found, sign = solution([[*row, right] for row, right in zip(A, b, strict=True)])
+        assert sign == np.sign(np.linalg.det(A))
         assert found == pytest.approx(np.linalg.solve(A, b), rel=1e-11)  # conditions up to a thousand
     with np.errstate(all="ignore"):
-        assert solve(np.array([1.0, 2.0, 2.0, 4.0]), np.ones(2), 2) == 0.0
+        assert solution(list(np.array([[1.0, 2.0, 1.0], [2.0, 4.0, 1.0]])))[1] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Tables in expressions of loads against the functions that they sample."""
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import flexclear as fc
 from flexclear.dynamics import analyses
 from flexclear.dynamics.loads import lookup as lookups
 from flexclear.dynamics.sensitivity.dataset import sensitivities
-from flexclear.dynamics.specialise import dual
+from flexclear.dynamics.specialise import dual, symbols
 from flexclear.scene.load import scene_of
 from flexclear.scene.tables import LookupTable
 from flexclear.system.errors import InputError, SolverError
@@ -76,19 +75,16 @@ def simulate_table(load: Table, **more: Any) -> xr.Dataset:
 
 
 def test_a_table_and_its_slope_are_continuous_and_lines_bend_at_points(tables: dict[str, Table]) -> None:
-    """The kernels on numbers with derivatives, next to a point; SciPy's spline through the same points."""
+    """On numbers with derivatives, next to a point; SciPy's spline through the same points."""
     speeds = np.linspace(-2.0, 2.0, 41)
     spline = CubicSpline(speeds, DAMPER * np.tanh(speeds))
     for between in ("cubic", "linear"):
         given = LookupTable.model_validate(tables["damper"] | {"between": between})
         numbers = np.array(lookups.numbers(given))
         assert len(numbers) == lookups.length(given.levels())
-        d = SimpleNamespace(
-            load_numbers=[SimpleNamespace(value=value) for value in numbers], loads=[SimpleNamespace(number0=0)]
-        )
-        curve = dual.plain(lookups.curve)
+        table = symbols.Indexed(numbers.__getitem__)
         at = [0.3, 0.3 - 1e-12, 0.3 + 1e-12, 1.9999, -2.0, 2.0]
-        found = [curve(d, 0, 0, *given.levels(), dual.Dual(x, np.ones(1))) for x in at]
+        found = [lookups.curve(table, *given.levels(), dual.Dual(x, np.ones(1))) for x in at]
         value, slope = np.array([one.value for one in found]), np.array([one.change[0] for one in found])
         np.testing.assert_allclose(value[1:3], value[0], rtol=0.0, atol=1e-10)
         if between == "cubic":
@@ -98,7 +94,7 @@ def test_a_table_and_its_slope_are_continuous_and_lines_bend_at_points(tables: d
             steps = np.diff(DAMPER * np.tanh([0.2, 0.3, 0.4])) / 0.1
             np.testing.assert_allclose(slope[[1, 2]], steps, rtol=1e-11)
         with np.errstate(invalid="ignore"):
-            assert all(np.isnan(curve(d, 0, 0, *given.levels(), x)) for x in (2.001, -2.001))
+            assert all(np.isnan(lookups.curve(table, *given.levels(), x)) for x in (2.001, -2.001))
 
 
 def test_a_run_ends_where_it_leaves_a_table_and_says_so(tables: dict[str, Table]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -11,10 +10,11 @@ from typing import Any
 import pytest
 
 from flexclear.dynamics.compile import functions
-from flexclear.dynamics.compile.sources import kernels, sources, specialised
+from flexclear.dynamics.compile.sources import sources, specialised
 from flexclear.dynamics.contact import form as contact_forms
 from flexclear.dynamics.effects import CHAIN, FORMS, WHOLE, Parts, Scheme, most_parts, scheme_of
 from flexclear.dynamics.joints import JOINTS
+from flexclear.dynamics.mechanics.of_topology import list_of
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.specialise.topology import topology_of
@@ -64,19 +64,11 @@ def parts(path: Path) -> Parts:
 
 #: effect -> word that its generated source must have
 EFFECTS = {
-    "contact": 'SURFACES["clearance-spherical"]',
-    "normal law": 'FORMS["hysteretic"]',
-    "friction": 'FRICTION_LAWS["',
-    "flexible bodies": "flexible_bodies",
-    "closures": "closures=",
+    "contact events": "contact_events import located",
+    "sliding": "contact_phases import regimes",
+    "closures": "calls.project",
     "singular poses": "poses=singular_step",
-    "couplings": "make_coupled_closing",
-    "stops": "make_stops",
-    "stiffening": "flexible_bodies(stiffening)",
-    "loads": "make_loads",
     "harmonics": "import oscillate",
-    "joint friction": "make_joint_friction",
-    "wear": "import wearing",
     "guards": "integrate.guards import",
 }
 SPRING = ("spring-damper",)
@@ -85,22 +77,22 @@ RUBBING = {**SMOOTH, "frictions": ("modified-coulomb",)}
 CASES: dict[str, tuple[Parts, set[str]]] = {
     "tree": (Parts(("spherical",)), set()),
     "ideal": (Parts(("prismatic", "spherical"), closures=True), {"closures"}),
-    "smooth clearance": (Parts(("free",), **SMOOTH), {"contact", "normal law"}),
+    "smooth clearance": (Parts(("free",), **SMOOTH), {"contact events"}),
     "clearance": (
         Parts(("prismatic", "spherical"), **RUBBING, closures=True),
-        {"contact", "normal law", "friction", "closures", "guards"},
+        {"contact events", "sliding", "closures", "guards"},
     ),
-    "flexible": (Parts(("fixed",), flexible=True), {"flexible bodies"}),
-    "stiffened": (Parts(("fixed",), flexible=True, effects=("stiffening",)), {"flexible bodies", "stiffening"}),
-    "springs": (Parts(("prismatic",), loads=SPRING), {"loads"}),
+    "flexible": (Parts(("fixed",), flexible=True), set()),
+    "stiffened": (Parts(("fixed",), flexible=True, effects=("stiffening",)), set()),
+    "springs": (Parts(("prismatic",), loads=SPRING), set()),
     "waves": (Parts(("prismatic",), harmonics=True), {"harmonics"}),
-    "geared": (Parts(("revolute",), closures=True, effects=("gears",)), {"closures", "couplings"}),
-    "stopped": (Parts(("revolute",), forms=("hysteretic",), effects=("stops",)), {"stops", "normal law"}),
+    "geared": (Parts(("revolute",), closures=True, effects=("gears",)), {"closures"}),
+    "stopped": (Parts(("revolute",), forms=("hysteretic",), effects=("stops",)), {"contact events"}),
     "rubbing hinges": (
         Parts(("revolute",), closures=True, effects=("joint_friction modified-coulomb",)),
-        {"closures", "joint friction", "friction", "guards"},
+        {"closures", "guards"},
     ),
-    "worn": (Parts(("free",), **SMOOTH, effects=("wear",)), {"contact", "normal law", "wear"}),
+    "worn": (Parts(("free",), **SMOOTH, effects=("wear",)), {"contact events"}),
     "everything": (
         Parts(
             ("fixed", "spherical"),
@@ -117,27 +109,24 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
 }
 
 
-def generated(parts: Parts, scheme: Scheme = SCHEME) -> dict[str, str]:
-    """Files of a mechanism whose topology has no code of its own."""
-    return sources(parts, scheme) | kernels(parts)
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_the_entry_names_the_effects_present_and_no_other(case: str) -> None:
     found, present = CASES[case]
-    source = "".join(generated(found).values())
+    source = "".join(sources(found, SCHEME).values())
     if "closures" in present:  # loops alone have singular poses
         present = present | {"singular poses"}
     for effect, word in EFFECTS.items():
         assert (word in source) == (effect in present), effect
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_absent_laws_joints_and_loads_are_not_composed(case: str) -> None:
-    found, _ = CASES[case]
-    source = "".join(generated(found).values())
-    for table, names in {"JOINTS": found.joints, "SURFACES": found.surfaces, "LOADS": found.loads}.items():
-        assert set(re.findall(rf'{table}\["([\w-]+)"\]', source)) == set(names)
+def test_absent_contacts_loads_and_loops_are_not_called(root: Path) -> None:
+    """Of a pendulum nothing but a tree is evaluated; of the paper's mechanism contacts and loops as well."""
+    found = []
+    for name in ("checks/pendulum", CSJ):
+        model = tabulate(build(load_scene(path_of(root, name)), {}))
+        codes = list_of(model.parts, topology_of(model.arrays, model.arrays.h)).codes
+        found.append({code.name for code in codes} & {"touch", "stop", "act", "closure", "coupling", "friction_of"})
+    assert found == [set(), {"touch", "closure"}]
 
 
 def test_declarations_of_effects_are_read_without_what_compiles() -> None:
@@ -179,7 +168,7 @@ def test_only_scenes_whose_joints_make_loops_have_closures() -> None:
 
 
 def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
-    return {name: functions.digest(text) for name, text in generated(found, scheme).items()}
+    return {name: functions.digest(text) for name, text in sources(found, scheme).items()}
 
 
 def digest(scene: Scene) -> str:
@@ -265,10 +254,10 @@ def test_another_set_of_laws_is_other_machine_code(root: Path) -> None:
     def clearance(change: dict[str, Any]) -> str:
         table = compose(path_of(root, CSJ))
         table["joint"]["A1"] = {k: v for k, v in {**table["joint"]["A1"], **change}.items() if v is not None}
-        return digest(Scene.model_validate(table))
+        return specialised_code(Scene.model_validate(table))
 
     found = [clearance({}), clearance({"friction": None}), clearance({"normal": {"law": "hertz"}})]
-    found.append(digest(load_scene(path_of(root, IDEAL))))
+    found.append(specialised_code(load_scene(path_of(root, IDEAL))))
     assert len(set(found)) == len(found)
 
 
@@ -290,7 +279,7 @@ def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
     """Steps know neither joints nor bodies nor laws; what is recorded and the equations know no integrator."""
     one, whole = CASES["clearance"][0], CASES["everything"][0]
     mine, theirs = digests(one, SCHEME), digests(whole, SCHEME)
-    assert [name for name in mine if mine[name] == theirs[name]] == ["resolve", "observe", "advance"]
+    assert [name for name in mine if mine[name] == theirs[name]] == ["project", "resolve", "observe", "advance"]
     # they end on guards, whatever these watch: sliding in joints or along coordinates
     hinges, springs = CASES["rubbing hinges"][0], replace(CASES["springs"][0], closures=True, load_kinks=True)
     assert digests(hinges, SCHEME)["advance"] == digests(springs, SCHEME)["advance"] != mine["advance"]

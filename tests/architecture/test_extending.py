@@ -123,7 +123,7 @@ def test_surfaces(tree: Path) -> None:
     np.testing.assert_allclose(run["position"].values[:, 0, 2], 3.0 * t, rtol=0.0, atol=1e-12)
 
 
-#: steps' functions against kernels, as for parts of the program
+#: compiled functions of steps against the same in Python, as for parts of the program
 COMPARED = """
 import sys
 from flexclear.dynamics.model.mechanism import build
@@ -137,7 +137,7 @@ for path in sys.argv[1:]:
 """
 
 
-def test_steps_compute_what_kernels_do(root: Path, tree: Path) -> None:
+def test_compiled_steps_compute_what_python_does(root: Path, tree: Path) -> None:
     scenes = [examples(root) / f"{name}.toml" for name in ("oldham", "ball_in_tube", "quadratic_drag")]
     python("-c", COMPARED, *scenes, cwd=tree, PYTHONPATH=os.pathsep.join(map(str, (tree / "pipeline", root))))
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from flexclear.dynamics.compile import calls
 from flexclear.dynamics.compile.sources import sources
 from flexclear.dynamics.effects import Parts, Scheme, scheme_of
-from flexclear.dynamics.equations import articulated
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.integrate.method import keep_nothing
 from flexclear.scene.integrators import INTEGRATORS
@@ -42,8 +42,7 @@ def test_events_at_step_ends_are_compiled_when_asked_for() -> None:
 def test_a_method_is_what_the_list_says(name: str) -> None:
     method, traits = METHODS[name], INTEGRATORS[name]
     assert method.traits is traits
-    given = [lambda *_: None] * 2
-    _, _, error, _, keep = method.make_kernels(*given, *([(given[0], articulated)] if traits.reads_all else []))
+    _, _, error, _, keep = method.make_kernels(lambda *_: None, calls)
     assert (error is not None) is traits.estimates is (method.error_order > 0)
     # an implicit method remembers its polynomial or its slopes to predict by, a multistep one needs them
     assert (keep is not keep_nothing) is (method.room.vectors > 0)

@@ -65,12 +65,12 @@ def test_python_has_each_field_of_each_row(name: str) -> None:
 def changed(h, f, w, n):
     """Something of every kind: returns a number, and writes into w and n."""
     d = data(h, f, w, n)
-    frame, tree = d.link_frames[1], d.own[2]
+    frame, touch = d.link_frames[1], d.touch[2]
     frame.origin = (frame.omega[2], d.link_numbers[0].com[1], 7)
     frame.axes = d.site_numbers[2].axes
-    tree.mass += tree.inertia[4]
-    tree.inertia[5] = d.gravity[0].acceleration[2]
-    d.modal_bias[1] += d.u[2]
+    touch.gap += d.link_numbers[1].inertia[4]
+    d.law[1].rate = d.gravity[0].acceleration[2]
+    d.schur[1] += d.u[2]
     d.evaluation, d.abridged = d.links[2].joint, d.state + 3
     d.mode[1] += 5
     d.rtol = d.last_pivot + d.w[d.at_y + 1] + d.at_touch

@@ -9,16 +9,20 @@ import numpy as np
 import xarray as xr
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile import sources
-from flexclear.dynamics.model import initial
+from flexclear.dynamics.drives.oscillation import oscillate
+from flexclear.dynamics.equations.prescribed_motion import make_laws, nothing
+from flexclear.dynamics.mechanics.of_topology import list_of
+from flexclear.dynamics.model import initial, selection
 from flexclear.dynamics.model.arrays import WorkSpace, _work_lengths
 from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import Model, tabulate
-from flexclear.dynamics.specialise.trace import Trace
+from flexclear.dynamics.routines.numbers import Numbers
+from flexclear.dynamics.specialise import dual
+from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import GRAVITY, Table, joint
-from tests.properties.test_specialised import keep_independent
 
 #: of a slender rod of 1 kg and 1 m along x; the first only keeps its spin regular
 ROD = [1e-3, 1.0 / 12.0, 1.0 / 12.0]
@@ -27,7 +31,7 @@ ACROSS = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
 
 
 class Evaluated(NamedTuple):
-    """An evaluation, with what `tree_factor` reads of an engine.
+    """An evaluation, with what `matrices` reads of an engine.
 
     rates: of the state.  drives: forces of the drives.  report: n[EVALUATION].  lengths: of what is in w.
     """
@@ -46,6 +50,10 @@ class Evaluated(NamedTuple):
     @property
     def w(self) -> np.ndarray:
         return self.space.w
+
+    @property
+    def n(self) -> np.ndarray:
+        return self.space.n
 
     def stretch(self, index: int) -> np.ndarray:
         return self.w[self.h[index] :][: self.lengths[index]]
@@ -189,13 +197,6 @@ def tabulated(scene: Scene) -> Model:
     return tabulate(build(scene, reduced(scene)))
 
 
-def right_hand_side(model: Model) -> Any:
-    """The kernel of the right-hand side that is compiled for a model."""
-    scope: dict[str, Any] = {}
-    exec(sources.kernels(model.parts)["evaluate"].partition("@calls")[0], scope)
-    return scope["right_hand_side"]
-
-
 def evaluated(
     model: Model,
     speeds: float = 0.1,
@@ -219,24 +220,48 @@ def evaluated(
         start[model.speeds.stop :] += internal * random.normal(size=model.ny - model.speeds.stop)
     for link, modes in model.numbering.modal_positions.items():  # a millimetre or so
         start[modes] = 1e-3 * model.links[link].mass ** 0.5 * random.normal(size=len(modes))
-    w = space.w.astype(number)
+    w = space.w
     w[y : y + model.ny], n[n[m.MODE] : n[m.MODE] + len(model.contacts)] = start, closed
     w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
     n[n[m.ACTIVE] : n[m.ACTIVE] + model.arrays.size(m.N_LAWS)] = model.arrays.table(m.LAWS)["piece0"]
-    plain = (Trace(0) if number is float else Long(0)).plain(right_hand_side(model))
-
-    def rates(h: Any, f: Any, w: Any, n: Any, y: int, dy: int) -> None:
-        plain(h, f, w, n, number(0.1), y, dy)
-
-    keep_independent(model, h, y, dy, w.copy(), n.copy(), rates)
-    rates(h.tolist(), f.astype(number), w, n, y, dy)
-    drives = w[h[m.DRIVE_FORCE] :][: model.arrays.size(m.N_DRIVES)]
-    lengths = _work_lengths(h, m.Room(2, 0), model.arrays.columns)
-    return Evaluated(model, space._replace(w=w), w[dy : dy + model.ny], drives, int(n[m.EVALUATION]), lengths)
+    harmonics = oscillate if model.parts.harmonics else nothing
+    make_laws(harmonics)(h, f, w, n, 0.1)
+    keep_independent(model, space, y, dy)
+    space = space._replace(w=w.astype(number))
+    by_routines(model, space, y, dy)
+    drives = space.w[h[m.DRIVE_FORCE] :][: model.arrays.size(m.N_DRIVES)]
+    lengths = _work_lengths(h, m.Room(2, 0))
+    return Evaluated(model, space, space.w[dy : dy + model.ny], drives, int(n[m.EVALUATION]), lengths)
 
 
-class Long(Trace):
-    """Kernels in extended precision, functions of NumPy included."""
+def by_routines(model: Model, space: WorkSpace, y: int, dy: int) -> None:
+    """Evaluate a mechanism with all that the record has, in Python, on numbers of the work space's type."""
+    f = model.arrays.f.astype(space.w.dtype)
+    calls, n = Numbers(space.h, f, space.w, space.n, y, dy), space.n
+    list_of(model.parts, topology_of(model.arrays, space.h), m.RECORD_CALLS, calls)
+    n[[m.EVALUATION, m.ABRIDGED, m.STATE]] = calls.report, 0, y
 
-    def _function(self, name: str) -> Any:
-        return lambda *arguments: getattr(np, name)(*map(np.longdouble, arguments))
+
+def keep_independent(model: Model, space: WorkSpace, y: int, dy: int) -> None:
+    """Solve for as many closure rows as are independent, where some follow from others."""
+    mobility, (h, w, *_) = analyse(model), space
+    if mobility.redundant:
+        by_routines(model, space, y, dy)
+        J = selection.dense_rows(model, h, w[h[m.JACOBIAN] :][: h[m.JACOBIAN_SIZE]])
+        selection.write(model, h, selection.choose(J, np.ones(len(J)), mobility.rank)[0])
+
+
+def known_accelerations(found: Evaluated) -> np.ndarray:
+    """What the selected closure rows demand of J du, of free coordinates alone: minus the rates at which they open at
+    constant speeds of these, by derivatives along the motion."""
+    model, (h, w, n, *_), arrays = found.model, found.space, found.model.arrays
+    y, dy, change = int(h[m.Y]), int(h[m.SLOPES]), np.zeros(len(found.w))
+    change[y : y + model.nq] = found.rates[: model.nq]
+    laws = m.named(m.LAW, w[h[m.LAW.at] :][: m.LAW.size * arrays.size(m.N_LAWS)])
+    changed = m.named(m.LAW, change[h[m.LAW.at] :][: m.LAW.size * arrays.size(m.N_LAWS)])
+    changed["value"], changed["rate"] = laws["rate"], laws["second_rate"]
+    numbers = np.array(dual.seeded(w.astype(float), change[None, :]), dtype=object)
+    calls = Numbers(h, arrays.f, numbers, n, y, dy)
+    list_of(model.parts, topology_of(arrays, h), m.CALLS, calls)
+    opening = numbers[h[m.RESIDUAL_RATE] :][: arrays.size(m.N_CLOSURE_ROWS)]
+    return -dual.changes(opening, 1)[0][selection.selected_indices(model, h)]

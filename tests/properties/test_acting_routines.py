@@ -1,4 +1,4 @@
-"""Routines of contacts, stops and loads compute what kernels do: of random mechanisms, in contact and out of it."""
+"""Compiled contacts, stops and loads compute what they do in Python: of random mechanisms, in contact and out of it."""
 
 from functools import cache
 from itertools import product
@@ -6,16 +6,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from flexclear.dynamics import joints as kinds_of_joints
 from flexclear.dynamics import loads as kinds_of_loads
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact import surfaces as kinds_of_surfaces
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.normal import NORMAL_LAWS
-from flexclear.dynamics.mechanics.joints import JOINTS
-from flexclear.dynamics.mechanics.loads import LOADS
 from flexclear.dynamics.mechanics.of_topology import list_of
-from flexclear.dynamics.mechanics.surfaces import SURFACES as SURFACES_OF_ROUTINES
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.specialise.topology import topology_of
@@ -151,7 +147,7 @@ def pressed(number: int) -> Evaluated:
 
 @pytest.mark.parametrize("number", NUMBERS)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_random_mechanisms_in_contact_move_as_by_kernels(number: int) -> None:
+def test_random_mechanisms_in_contact_move_as_in_python(number: int) -> None:
     """Rates of positions, speeds, bristles, turns and integral parts, powers of the ledger; what steps read."""
     found = pressed(number)
     assert_alike(found)
@@ -180,13 +176,6 @@ def test_every_surface_law_and_load_is_tried() -> None:
     assert kinds == set(kinds_of_loads.LOADS)
 
 
-def test_routines_know_all_parts() -> None:
-    """Nothing else makes steps."""
-    assert set(JOINTS) == set(kinds_of_joints.JOINTS)
-    assert set(SURFACES_OF_ROUTINES) == set(kinds_of_surfaces.SURFACES)
-    assert set(LOADS) == set(kinds_of_loads.LOADS)
-
-
 def sampled(*of: list[float], between: str) -> Table:
     """A table over one or two angles."""
     columns = [{"column": f"q{k}", "unit": "rad"} for k in range(len(of))]
@@ -197,7 +186,7 @@ def sampled(*of: list[float], between: str) -> Table:
 
 @pytest.mark.parametrize("between", ["cubic", "linear"])
 @pytest.mark.parametrize("angles", [0.0, 0.4, 3.0])
-def test_tables_are_looked_up_as_by_kernels(between: str, angles: float) -> None:
+def test_tables_are_looked_up_as_in_python(between: str, angles: float) -> None:
     """Over one and two quantities, with one interval and many; outside of them nothing is a number."""
     random = np.random.default_rng(3)
     near, far = ([-1.0, *np.sort(random.uniform(-1.0, 1.0, size=count)).tolist(), 1.0] for count in (3, 9))
@@ -259,12 +248,12 @@ def assert_rubs_alike(found: Evaluated) -> None:
 
 @pytest.mark.parametrize("number", range(10))
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_joints_rub_as_by_kernels(number: int) -> None:
+def test_joints_rub_as_in_python(number: int) -> None:
     assert_rubs_alike(evaluated(tabulate(build(Scene.model_validate(rubbing_tree(number)), {})), turns=0.1))
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_many_joints_rub_as_by_kernels_and_code_grows_little() -> None:
+def test_many_joints_rub_as_in_python_and_code_grows_little() -> None:
     """Bearings of another number are other rows of the same routines, which a loop of calls runs."""
     sizes = []
     for count in (9, 18):
@@ -298,7 +287,7 @@ def pressed_rods() -> Table:
 
 @pytest.mark.parametrize("name", ["friction", "friction in a loop", "pressed"])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_forces_act_on_flexible_bodies_as_by_kernels(name: str) -> None:
+def test_forces_act_on_flexible_bodies_as_in_python(name: str) -> None:
     found = evaluated(tabulated(Scene.model_validate(BENT[name] if name in BENT else pressed_rods())))
     assert found.model.parts.flexible
     assert_rubs_alike(found)
@@ -306,17 +295,17 @@ def test_forces_act_on_flexible_bodies_as_by_kernels(name: str) -> None:
 
 @pytest.mark.parametrize("number", range(3))
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_joints_of_loops_rub_as_by_kernels(number: int) -> None:
+def test_joints_of_loops_rub_as_in_python(number: int) -> None:
     assert_rubs_alike(evaluated(tabulate(build(Scene.model_validate(with_friction(two_loops(), number)), {}))))
 
 
 # Steps ----------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name", ["checks/clearance_pendulum", "checks/stops", "checks/rubbing_slider_crank"])
 def test_steps_in_contact_run_on_routines(name: str) -> None:
-    """Events, guards and impact rates are as by kernels; steps between, where no force acts, follow rounding."""
+    """Events, guards and impact rates are as by straight code; steps between, where no force acts, follow rounding."""
     scene = load_scene(TREE / f"scenes/{name}.toml")
     runs = by_ways(scene.model_copy(update={"time": scene.time.model_copy(update={"end": 0.1 * scene.time.end})}))
     events = {way: np.array([one.events[key] for key in ("time", "contact", "kind")]) for way, one in runs.items()}
     for way, run in runs.items():
-        assert events[way] == pytest.approx(events["kernels"], abs=1e-9)
-        assert apart(run.state, runs["kernels"].state) < 1e-9
+        assert events[way] == pytest.approx(events["straight code"], abs=1e-9)
+        assert apart(run.state, runs["straight code"].state) < 1e-9

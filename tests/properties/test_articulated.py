@@ -9,28 +9,32 @@ import pytest
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.bodies.flexible import flexible_bodies
-from flexclear.dynamics.equations import articulated
-from flexclear.dynamics.equations.closures import make_closing
-from flexclear.dynamics.equations.projection import make_stiffen
-from flexclear.dynamics.fields import data
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.mechanics.of_topology import program_of
-from flexclear.dynamics.model import selection
+from flexclear.dynamics.mechanics.evaluation import placed
+from flexclear.dynamics.mechanics.of_topology import mechanism_of, program_of
+from flexclear.dynamics.mechanics.record import store_energies
+from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.model.interface_basis import modes_of
+from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation.matrices import Matrices, holding_forces
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.specialise.topology import topology_of
-from flexclear.dynamics.specialise.trace import Trace
+from flexclear.dynamics.vectors import Vector, Wrench
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
 from tests.properties import tapes
-from tests.properties.articulated_chains import Evaluated, Long, bending, evaluated, reduced, rods, tabulated
+from tests.properties.articulated_chains import (
+    Evaluated,
+    bending,
+    evaluated,
+    known_accelerations,
+    reduced,
+    rods,
+    tabulated,
+)
 from tests.properties.mechanisms import Table
-from tests.properties.test_specialised import description_kernel
 
 #: of the largest; the mass matrix of the chains here has a condition of 1e5 at most, of which 2e-12 was left
 ROUNDING = 1e-9
@@ -88,7 +92,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
 
 def full(found: Evaluated) -> np.ndarray:
     """Factor of the mass matrix in full."""
-    return mass_factor(cast("Engine", found))
+    return Matrices(cast("Engine", found)).factor
 
 
 @cache
@@ -99,71 +103,21 @@ def bent(name: str) -> Evaluated:
     return found
 
 
-def probed(found: Evaluated) -> list[np.ndarray]:
-    """Some forces, then what else reads the factors: L^-1 and L^-T of them, power of the drives, and the correction
-    that closes loops with the modes' stiffness next to their mass."""
-    closing, model = make_closing(articulated), found.model
-    stiffen, correction = make_stiffen(closing, articulated, flexible_bodies()), closing.correction
-
-    @kernel
-    def half(h, f, w, n):
-        d = data(h, f, w, n)
-        articulated.forward(d, d.at_correction)
-
-    @kernel
-    def other_half(h, f, w, n):
-        d = data(h, f, w, n)
-        articulated.backward(d, d.at_correction)
-
-    @kernel
-    def power(h, f, w, n):
-        d = data(h, f, w, n)
-        d.last_pivot = articulated.drive_power(d, d.at_correction, d.at_u)
-
-    @kernel
-    def close(h, f, w, n):
-        d = data(h, f, w, n)
-        stiffen(d)
-        correction(d, d.at_residual, d.at_correction)
-
-    w, at = found.w.copy(), int(found.h[m.CORRECTION])
-    pivot, step = slice(int(found.h[m.PIVOT]), int(found.h[m.PIVOT]) + 1), slice(at, at + model.nv)
-    w[step] = np.random.default_rng(3).normal(size=model.nv)
-    made = [w[step].copy()]
-    for made_of, place in ((half, step), (other_half, step), (power, pivot), (close, step)):
-        Trace(0).plain(made_of)(found.h.tolist(), model.arrays.f, w, found.space.n)
-        made.append(w[place].copy())
-    return made
-
-
-@pytest.mark.parametrize("name", ["branches", "driven", "held shapes", "loop", "held shapes in a loop", "driven loop"])
-@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_projection_and_exponential_steps_read_the_same_factor(name: str) -> None:
-    """As dense algebra does; the drives' power by kinetic energies, like the factor."""
-    found = bent(name)
-    L, model, energy = full(found), found.model, kinetic_energy(found)
-    modes, speeds = modes_of(model.arrays), found.stretch(m.U).copy()
-    forces, half, whole, power, closed = probed(found)
-    assert apart(half, np.linalg.solve(L, forces)) < ROUNDING
-    assert apart(whole, np.linalg.solve(L.T, half)) < ROUNDING
-    speeds[: model.nv], free = 0.0, np.append(modes @ whole, np.zeros(len(found.drives)))
-    moved = energy(free)
-    assert np.sum((L.T @ whole) ** 2) == pytest.approx(float(2.0 * moved), rel=ROUNDING)
-    assert power[0] == pytest.approx(float(energy(free + speeds) - moved - energy(speeds)), rel=ROUNDING, abs=1e-30)
-    J = selection.dense_rows(model, found.h, found.stretch(m.JACOBIAN))
-    residual = found.stretch(m.RESIDUAL)[selection.selected_indices(model, found.h)]
-    assert apart(J @ closed, -residual) < ROUNDING
-    assert bool(np.any(closed)) == ("loop" in name)
-
-
 def kinetic_energy(found: Evaluated) -> Callable[[np.ndarray], Any]:
     """Kinetic energy of the speeds of all coordinates in the evaluated pose, in extended precision."""
-    model, h, w = found.model, found.h, found.w.astype(np.longdouble)
-    plain, u = Long(0).plain(description_kernel(model)), slice(int(h[m.U]), int(h[m.U]) + len(found.stretch(m.U)))
+    model, h, w, f = found.model, found.h, found.w.astype(np.longdouble), found.model.arrays.f.astype(np.longdouble)
+    y, drives, tables = int(h[m.Y]), model.arrays.size(m.N_DRIVES), Tables(model.parts, topology_of(model.arrays, h))
+    rates = int(h[m.LAW.at]) + m.LAW.rate + m.LAW.size * np.arange(drives)
 
     def energy(speeds: np.ndarray) -> Any:
-        w[u] = speeds
-        plain(h.tolist(), model.arrays.f.astype(np.longdouble), w, found.space.n)
+        w[y : y + model.ny][model.speeds], w[rates] = speeds[: model.nv], speeds[model.nv :]
+        mechanism = mechanism_of(tables)
+        with Numbers(h, f, w, found.space.n, y, int(h[m.SLOPES])).building() as calls:
+            placed(mechanism)
+            for link in mechanism.links:
+                if link.modes:
+                    link.modes.need(link.motion, masses=False)  # sums over modes
+            store_energies(tables, mechanism, calls)
         return sum(w[int(h[m.ENERGY.at]) :: m.ENERGY.size][: model.arrays.size(m.N_COMPONENTS)])
 
     return energy
@@ -181,13 +135,14 @@ def mass_by_energy(found: Evaluated) -> np.ndarray:
 
 
 def drives_bias(found: Evaluated) -> np.ndarray:
-    """Forces of the drives without free accelerations: wrenches along their columns."""
-    moments, pushes = carried_wrenches(cast("Engine", found))
-    columns, numbering = found.table(m.COLUMNS), found.model.numbering
-    made = np.zeros(len(found.drives))
+    """Forces of the drives without free accelerations: wrenches along their motions."""
+    engine, numbering, made = cast("Engine", found), found.model.numbering, np.zeros(len(found.drives))
+    wrenches, links = holding_forces(engine)[1], Matrices(engine).mechanism.links
     for i, coordinates in enumerate(numbering.coordinates):
-        for k in (c for c in coordinates if c >= numbering.nv):
-            made[k - numbering.nv] = columns["angular"][k] @ moments[i] + columns["linear"][k] @ pushes[i]
+        for e, k in enumerate(coordinates):
+            if k >= numbering.nv:
+                link, wrench = links[i - 1], Wrench(*map(Vector, np.split(wrenches[i], 2)))
+                made[k - numbering.nv] = wrench.about(-link.motion.p_WB).on(link.step.S[e])
     return made
 
 
@@ -211,12 +166,12 @@ def test_bodies_have_the_mass_that_their_energy_says(name: str) -> None:
     assert np.array_equal(L, np.tril(L))
     L = modes @ L
     assert apart(L @ L.T, M[:nv, :nv]) < 1e-12  # differences of energies in extended precision
-    selected = selection.selected_indices(model, found.h)
-    J, spread = (selection.dense_rows(model, found.h, found.stretch(at)) for at in (m.JACOBIAN, m.SPREAD))
+    by_routines, loops = (one := Matrices(cast("Engine", found))), one.loops
+    J, spread = by_routines.jacobian[:, :nv], by_routines.dense({k: by.V for k, by in loops.found.items()})[:, :nv]
     assert apart(L @ spread.T, modes @ J.T) < ROUNDING
     J = J @ modes.T
     full_matrix = np.block([[M[:nv, :nv], J.T], [J, np.zeros((len(J),) * 2)]])
-    forces = np.concatenate([-modes @ bias(cast("Engine", found)), found.stretch(m.GAMMA)[selected]])
+    forces = np.concatenate([-modes @ holding_forces(cast("Engine", found))[0], known_accelerations(found)])
     solved = np.linalg.solve(full_matrix, forces)[:nv]
     assert apart(found.rates[model.speeds], solved) < ROUNDING
     if not len(J):
@@ -225,7 +180,7 @@ def test_bodies_have_the_mass_that_their_energy_says(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["branches", "held shapes in a loop", "driven loop", "stiffened"])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_straight_code_of_flexible_bodies_computes_what_kernels_do(name: str) -> None:
+def test_straight_code_of_flexible_bodies_computes_what_calls_do(name: str) -> None:
     found = bent(name)
     model, h, w, n = found.model, found.h, found.w.copy(), found.space.n.copy()
     y, dy = int(h[m.Y]), int(h[m.SLOPES])
@@ -236,7 +191,7 @@ def test_straight_code_of_flexible_bodies_computes_what_kernels_do(name: str) ->
 
 
 def test_rounding_does_not_grow_with_the_number_of_flexible_rods() -> None:
-    """40 rods, against the same kernels in extended precision."""
+    """40 rods, against the same calls in extended precision."""
     model = tabulated(Scene.model_validate(bending((FREE,) * 40, angles=UP_AND_DOWN)))
     found, exact = (evaluated(model, number=number) for number in (float, np.longdouble))
     assert apart(found.rates[model.speeds], exact.rates[model.speeds].astype(float)) < 1e-12  # measured 9e-15
@@ -285,7 +240,7 @@ def test_a_plane_chain_has_its_closed_form() -> None:
 
 @pytest.mark.parametrize("plane", [True, False])
 def test_rounding_does_not_grow_with_the_length(plane: bool) -> None:
-    """300 links, against the same kernels in extended precision."""
+    """300 links, against the same calls in extended precision."""
     model = tabulated(Scene.model_validate(rods(300, plane=plane)))
     found, exact = (evaluated(model, 0.5, 0.3, number) for number in (float, np.longdouble))
     assert np.finfo(np.longdouble).eps < 1e-18

@@ -17,8 +17,10 @@ from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.routines import store
 from flexclear.dynamics.routines.calls import RESULTS, SCENE, CallList, Cell, cells, routine
+from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.routines.store import load
-from flexclear.dynamics.routines.symbols import UndecidableError, branch, larger, smaller
+from flexclear.dynamics.specialise.dual import seeded
+from flexclear.dynamics.specialise.symbols import UndecidableError, branch, larger, smaller
 from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.schema import Scene
 from tests.properties.articulated_chains import evaluated, rods, tabulated
@@ -55,6 +57,32 @@ def test_routines_calculate_on_numbers_as_in_lists() -> None:
     for a, b in ((1.0, 2.0), (3.0, -0.5), (-1.0, 0.25)):
         found = run(calls, np.array([a, b]))
         assert [found[cell.index] for cell in results] == list(clipped(a, b))
+
+
+def test_products_with_sparse_matrices_are_those_of_full_ones() -> None:
+    """Rows of 0, 3 and 20 entries, some with the same columns; by a list, and on numbers with changes."""
+    random, n = np.random.default_rng(2), 24
+    pattern = np.zeros((9, n), dtype=bool)
+    pattern[:6, 2:22], pattern[6, [1, 5, 9]], pattern[8, 3:23] = True, True, True
+    rows, columns = np.nonzero(pattern)
+    entries, numbers = [rows, columns, np.arange(len(rows))], random.normal(size=2 * len(rows))
+    full, x = np.zeros(pattern.shape), random.normal(size=(2, n))
+    full[pattern] = numbers[1::2]
+    f = np.concatenate([numbers, *x])
+    vectors = [cells(SCENE, len(numbers) + k * n, n) for k in range(2)]
+    calls = CallList()
+    made = calls.products(Cell(SCENE, 1), 2, entries, vectors, len(full))
+    found = run(calls, f)
+    assert np.array([[found[one.index] for one in row] for row in made]) == pytest.approx(x @ full.T, rel=1e-13)
+    assert len(calls.calls) == 2 * (1 + 2 + 1) + 1  # columns by 16; four rows together, three alone; short row
+
+    changes = random.normal(size=(2, n))
+    h, w, n_ = np.zeros(m.HEADER, dtype=np.int64), np.zeros(1), np.zeros(m.INTEGERS, dtype=np.int64)
+    on_numbers = Numbers(h, f, w, n_, 0, 0)
+    moved = on_numbers.products(Cell(SCENE, 1), 2, entries, [seeded(x[0], changes), vectors[1]], len(full))
+    assert [one.value for one in moved[0]] == pytest.approx(full @ x[0])
+    assert np.array([one.change for one in moved[0]]) == pytest.approx(full @ changes.T)
+    assert moved[1] == pytest.approx(full @ x[1])
 
 
 def test_conditions_of_python_on_symbols_are_refused_with_their_place() -> None:

@@ -1,4 +1,4 @@
-"""What kernels do with closure rows in threes is what dense algebra does with all of them at once."""
+"""What routines do with closure rows is what dense algebra does with all of them at once."""
 
 from typing import Any, cast
 
@@ -7,14 +7,15 @@ import pytest
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model import selection, tree
+from flexclear.dynamics.model.interface_basis import modes_of
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.tree_factor import mass_factor
+from flexclear.dynamics.run.evaluation.matrices import Matrices
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE
-from tests.properties.articulated_chains import evaluated
+from tests.properties.articulated_chains import evaluated, known_accelerations
 from tests.properties.mechanisms import LEAN, frame, joint, two_loops
 
 #: rows of closures that are solved for, per scene
@@ -30,15 +31,6 @@ ROUNDING = 1e-11
 SOLVED = 1e-8
 
 
-def dense_factor(envelope: np.ndarray, entries: np.ndarray) -> np.ndarray:
-    """A Cholesky factor from its envelope, which has reciprocals on the diagonal."""
-    L = np.zeros((len(envelope),) * 2)
-    for i, (first, origin) in enumerate(envelope):
-        L[i, first : i + 1] = entries[origin + first : origin + i + 1]
-        L[i, i] = 1.0 / L[i, i]
-    return L
-
-
 def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
     """L^-1 J^T, the factor of J M^-1 J^T, and accelerations that keep the loops closed."""
     model = tabulate(build(scene, {}))
@@ -46,14 +38,17 @@ def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
     h, w = found.h, found.w
     assert found.report == m.OK
     assert model.arrays.table(m.CLOSURES, h)["n_kept"].tolist() == rows
-    J, S = (selection.dense_rows(model, h, w[h[place] :][: h[m.JACOBIAN_SIZE]]) for place in (m.JACOBIAN, m.SPREAD))
-    L = mass_factor(cast("Engine", found))
-    C = dense_factor(model.arrays.table(m.CLOSURE_ENVELOPE, h)[: len(J)], w[h[m.SCHUR] :])
-    bias = w[h[m.GAMMA] :][selection.selected_indices(model, h)]
-    accelerations = w[h[m.DU] :][: model.nv]
-    assert np.abs(S @ L.T - J).max() < ROUNDING * np.abs(J).max()
-    assert np.abs(C @ C.T - S @ S.T).max() < ROUNDING * np.abs(S @ S.T).max()
-    assert np.abs(J @ accelerations - bias).max() < SOLVED * np.abs(J).max() * np.abs(accelerations).max()
+    J = selection.dense_rows(model, h, w[h[m.JACOBIAN] :][: h[m.JACOBIAN_SIZE]])
+    made = Matrices(cast("Engine", found))
+    S = made.dense({k: by.V for k, by in made.loops.found.items()})[:, : model.nv]
+    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[: len(J)]
+    independent = 1.0 / np.abs(w[h[m.SCHUR] + envelope["origin"] + np.arange(len(J))])
+    accelerations = modes_of(model.arrays).T @ found.rates[model.speeds]
+    assert np.abs(S @ made.factor.T - J).max() < ROUNDING * np.abs(J).max()
+    assert np.abs(made.jacobian[:, : model.nv] - J).max() < ROUNDING * np.abs(J).max()
+    assert independent == pytest.approx(np.linalg.cholesky(S @ S.T).diagonal(), rel=ROUNDING)
+    gamma = known_accelerations(found)
+    assert np.abs(J @ accelerations - gamma).max() < SOLVED * np.abs(J).max() * np.abs(accelerations).max()
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -66,7 +61,7 @@ def test_rows_of_a_scene(name: str) -> None:
 def test_rows_of_two_loops_that_share_a_joint(
     monkeypatch: pytest.MonkeyPatch, cut: tuple[str, str], rows: list[int]
 ) -> None:
-    """The second loop of `two_loops` begins on a body of the first one: threes meet of which the last are not full."""
+    """The second loop of `two_loops` begins on a body of the first one: rows of both meet."""
     table: dict[str, Any] = two_loops()
     table["body"]["a"]["frames"]["P"] = frame((1.0, 0.0, 0.0), LEAN)
     table["joint"]["P"] = joint("planar", "a.P", "c.P")

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics.of_topology import program_of
+from flexclear.dynamics.mechanics.of_topology import list_of, program_of
 from flexclear.dynamics.model import initial
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
-from flexclear.dynamics.specialise import dual, program
+from flexclear.dynamics.routines.numbers import Numbers
+from flexclear.dynamics.specialise import dual, program, symbols
 from flexclear.dynamics.specialise.code import Program
 from flexclear.dynamics.specialise.derivative import tangent
 from flexclear.dynamics.specialise.tape import FLOAT, Tape, UnsuitedError
@@ -28,7 +29,8 @@ from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties import tapes
-from tests.properties.test_specialised import RIGID, keep_independent, rates_kernel
+from tests.properties.articulated_chains import keep_independent
+from tests.properties.test_specialised import RIGID
 
 #: of the largest change of a kind: products of up to a hundred factors, in another order than complex numbers take them
 ROUNDING = 1e-10
@@ -37,16 +39,16 @@ STEP = 1e-40
 
 def changes(scene: Scene, reduced: dict[str, Any], closed: int) -> list[np.ndarray]:
     """Changes of rates and contacts along a random direction: by a complex step of the tape, by its tangent, and by
-    kernels that run on numbers with changes."""
+    calls that run on numbers with changes."""
     model = tabulate(build(scene, reduced))
     space, random = model.arrays.work_space(m.Room(4, 0)), np.random.default_rng(2)
     h, y = space.h, int(space.h[m.Y])
     dy, vy, vdy = (int(h[m.SLOPES]) + k * model.ny for k in range(3))
-    f, w, n, kernel, begin = model.arrays.f, space.w, space.n, rates_kernel(model), initial.start_state(model)
+    f, w, n, begin = model.arrays.f, space.w, space.n, initial.start_state(model)
     begin += 1e-3 * random.normal(size=model.ny)  # the distance of two points that coincide has no derivative
     begin[model.speeds] += 0.1 * random.normal(size=model.nv)
     w[y : y + model.ny] = begin
-    keep_independent(model, h, y, dy, w.copy(), n.copy(), kernel)
+    keep_independent(model, space._replace(w=w.copy()), y, dy)
     laws = slice(h[m.LAW.at], h[m.LAW.at] + m.LAW.size * model.arrays.size(m.N_LAWS))
     impacts = slice(h[m.LATCHED], h[m.LATCHED] + len(model.contacts))
     w[laws], w[impacts], n[n[m.MODE] :] = 0.1 * random.normal(size=laws.stop - laws.start), 0.1, closed
@@ -64,8 +66,8 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int) -> list[np.ndarr
     assert np.allclose(exact["w"][dy : dy + model.ny], moved["w"][dy : dy + model.ny].real, rtol=1e-9, atol=1e-9)
     touch = slice(h[m.TOUCH.at], h[m.TOUCH.at] + m.TOUCH.size * len(model.contacts))
     dw[y : y + model.ny] = direction
-    numbers, given = dual.seeded(w, dw[None, :]), dual.seeded(f, df[None, :])
-    dual.plain(kernel)(h.tolist(), given, numbers, n.tolist(), y, dy)
+    numbers, given = (np.array(dual.seeded(a, da[None, :]), dtype=object) for a, da in ((w, dw), (f, df)))
+    list_of(model.parts, topology_of(model.arrays, h), m.CALLS, Numbers(h, given, numbers, n, y, dy))
     ways = [
         (moved["w"][dy : dy + model.ny].imag / STEP, moved["w"][touch].imag / STEP),
         (exact["w"][vdy : vdy + model.ny], exact["dw"][touch]),
@@ -144,7 +146,7 @@ WRITTEN = {
 @OPERATIONS
 def test_numbers_with_changes_follow_the_same_rules(operation: str, numbers: tuple[float, ...]) -> None:
     """Of all arguments, of each alone next to a plain number, and along two directions."""
-    function = WRITTEN.get(operation) or getattr(dual.plain(np), operation)
+    function = WRITTEN.get(operation) or getattr(symbols, {"round": "nearest"}.get(operation, operation))
 
     def at(*given: Any) -> np.ndarray:
         return dual.changes([function(*given)], 2)[0 if len(given) == 1 else slice(None), 0]

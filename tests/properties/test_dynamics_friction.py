@@ -13,10 +13,9 @@ from scipy.integrate import solve_ivp
 from flexclear.dynamics.contact import friction
 from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
 from flexclear.dynamics.mechanics.bearings import pressure
-from flexclear.dynamics.mechanics.vectors import Matrix, Vector, Wrench
+from flexclear.dynamics.vectors import ZERO, Matrix, Vector, Wrench
 from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
-from tests.properties.kernels import from_python
 from tests.properties.test_dynamics_drives import adams_step
 
 LUGRE = LuGre(
@@ -48,7 +47,7 @@ def part(law: Any) -> Any:
 
 def coefficient(law: Any, speed: float) -> float:
     kernel = import_module(f"{friction.__name__}.{law.law.replace('-', '_')}").coefficient
-    return float(from_python(kernel)(speed, part(law).parameters(law)))
+    return float(kernel(speed, part(law).parameters(law)))
 
 
 def test_every_friction_law_is_tried_here() -> None:
@@ -63,7 +62,7 @@ def test_friction_takes_energy_and_stays_below_the_static_limit(
     """For every deflection that the bristles can have, at every sliding speed."""
     z = np.array(bent) / np.sqrt(3.0) * (part(law).bristle(law) or 0.0)
     v = np.array(slip) * 10.0**size
-    pull, loss, stored, z_rate = from_python(part(law).traction)(tuple(z), tuple(v), force, part(law).parameters(law))
+    pull, loss, stored, z_rate = part(law).traction(Vector(z), Vector(v), force, part(law).parameters(law))
     # rounding of the root that finds the limit, and of the polynomials
     assert np.linalg.norm(pull) <= limit(law) * force * (1.0 + 1e-12) + 1e-300
     assert loss >= 0.0
@@ -78,8 +77,7 @@ def test_friction_takes_energy_and_stays_below_the_static_limit(
 
 @every_law
 def test_no_sliding_and_no_memory_is_no_force(law: Any) -> None:
-    zero = (0.0, 0.0, 0.0)
-    pull, loss, stored, z_rate = from_python(part(law).traction)(zero, zero, 10.0, part(law).parameters(law))
+    pull, loss, stored, z_rate = part(law).traction(ZERO, ZERO, 10.0, part(law).parameters(law))
     assert (*pull, loss, stored, *z_rate) == (0.0,) * 8
 
 
@@ -130,12 +128,12 @@ def test_bristles_under_steady_sliding_carry_the_stribeck_curve(speed: float) ->
     g = 0.1 + 0.05 * np.exp(-((speed / 1e-3) ** 2))
 
     def rhs(_: float, z: np.ndarray) -> np.ndarray:
-        return np.array(from_python(part(LUGRE).traction)((z[0], 0.0, 0.0), (speed, 0.0, 0.0), 1.0, p)[3][:1])
+        return np.array(part(LUGRE).traction(Vector([z[0], 0.0, 0.0]), Vector([speed, 0.0, 0.0]), 1.0, p)[3][:1])
 
     done = solve_ivp(rhs, (0.0, 40.0 * g / (1e5 * speed)), [0.0], "DOP853", rtol=1e-11, atol=1e-20)
     # forty relaxation times leave e^-40; the rest is the tolerance
     assert done.y[0, -1] == pytest.approx(g / 1e5, rel=1e-9)
-    pull = from_python(part(LUGRE).traction)((done.y[0, -1], 0.0, 0.0), (speed, 0.0, 0.0), 2.0, p)[0]
+    pull = part(LUGRE).traction(Vector([done.y[0, -1], 0.0, 0.0]), Vector([speed, 0.0, 0.0]), 2.0, p)[0]
     assert pull[0] == pytest.approx(-2.0 * min(g + 0.4 * speed, 0.15), rel=1e-8)
 
 
@@ -143,7 +141,7 @@ def test_bristles_that_hardly_slip_are_a_spring() -> None:
     """Below v_S the deflection follows the displacement x, less x^2 sigma_0 / (2 g)."""
     p, shift = part(LUGRE).parameters(LUGRE), 1e-9
     done = solve_ivp(
-        lambda _, z: np.array(from_python(part(LUGRE).traction)((z[0], 0.0, 0.0), (shift, 0.0, 0.0), 1.0, p)[3][:1]),
+        lambda _, z: np.array(part(LUGRE).traction(Vector([z[0], 0.0, 0.0]), Vector([shift, 0.0, 0.0]), 1.0, p)[3][:1]),
         (0.0, 1.0), [0.0], "DOP853", rtol=1e-11, atol=1e-22,
     )  # fmt: skip
     x = shift

@@ -10,10 +10,7 @@ from hypothesis import strategies as st
 
 from flexclear.dynamics import joints
 from flexclear.numerics.rotations import rotation_vector_to_quaternion, skew
-from tests.properties.kernels import from_python
 
-#: places in a work space of the tests' own
-AT_X, AT_U, AT_RATE, AT_S = 0, 7, 13, 20
 STEP = 1e-3
 #: fourth-order differences over STEP: angular rates of some rad/s give 3^5 (1e-3)^4 / 30 = 1e-11, rounding 1e-12
 DIFFERENCE = 1e-9
@@ -37,15 +34,13 @@ def declared(name: str) -> Any:
 
 
 def move(name: str, x: np.ndarray, u: np.ndarray, du: np.ndarray) -> Motion:
-    """What the joint's kernels say."""
-    w, n = np.full(AT_S + 36, np.nan), len(u)  # what the kernel does not write must not be read
-    w[AT_X : AT_X + len(x)], w[AT_U : AT_U + n] = x, u
-    kernels = declared(name)
-    R, p, *bias = from_python(kernels.motion)(w, AT_X, AT_U, AT_S)
-    from_python(kernels.position_rate)(w, AT_X, AT_U, AT_RATE)
-    S = w[AT_S : AT_S + 6 * n].reshape(n, 6).T
-    second = S @ du + np.concatenate(bias)
-    return Motion(np.reshape(R, (3, 3)), np.array(p), S @ u, second, S, w[AT_RATE : AT_RATE + len(x)])
+    """What the joint says."""
+    part = declared(name)
+    R, p, S, bias = part.motion(x.tolist(), u.tolist())
+    twists = np.reshape(S, (len(u), 6))
+    second = twists.T @ du + np.ravel(bias)
+    rate = np.array(part.position_rate(x.tolist(), u.tolist()))
+    return Motion(np.reshape(R, (3, 3)), np.array(p), twists.T @ u, second, twists.T, rate)
 
 
 def coordinates(name: str, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -90,7 +85,7 @@ def motions(name: str, x: np.ndarray, u: np.ndarray, du: np.ndarray) -> dict[int
 
 
 def seeds(test: Any) -> Any:
-    """Some random coordinates: the kernels have no branches, so that few examples show all."""
+    """Some random coordinates: motions have few branches, so that few examples show all."""
     return settings(max_examples=20)(given(seed=st.integers(0, 2**32 - 1))(test))
 
 

@@ -15,7 +15,6 @@ from flexclear.dynamics.contact import form as forms
 from flexclear.dynamics.contact import normal
 from flexclear.dynamics.contact.law import Numbers, Resolved
 from flexclear.scene.clearance import NormalLaw
-from tests.properties.kernels import from_python
 
 Parameters = tuple[float, float, float, float]
 
@@ -67,7 +66,7 @@ class Law:
 
     def parts(self, depth: float, rate: float, impact_rate: float) -> tuple[float, float]:
         form = forms.FORMS[self.resolved.form]
-        elastic, damping = from_python(form.force)(depth, rate, impact_rate, self.resolved.numbers)
+        elastic, damping = form.force(depth, rate, impact_rate, self.resolved.numbers)
         return float(elastic), float(damping)
 
     def force(self, depth: float, rate: float, impact_rate: float) -> float:
@@ -75,7 +74,7 @@ class Law:
 
     def stored(self, depth: float) -> float:
         form = forms.FORMS[self.resolved.form]
-        return float(from_python(form.stored)(depth, self.resolved.numbers))
+        return float(form.stored(depth, self.resolved.numbers))
 
 
 #: more examples than usual, since they try all coefficients of restitution of a law
@@ -105,7 +104,7 @@ def test_every_form_has_the_inverse_of_its_elastic_force(
     form: str, stiffness: float, exponent: float, depth: float
 ) -> None:
     numbers = Numbers(stiffness, 1.0 if form == "linear-damper" else exponent, 0.3)
-    elastic, _ = from_python(forms.FORMS[form].force)(depth, 0.0, 1.0, numbers)
+    elastic, _ = forms.FORMS[form].force(depth, 0.0, 1.0, numbers)
     found = Resolved(form, numbers, None, 1.0).depth(elastic)
     assert found == pytest.approx(depth, rel=1e-13)  # two powers, of logarithms up to 21 with rounding
     assert Resolved(form, numbers, None, 1.0).depth(0.0) == 0.0

@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flexclear.dynamics import analyses
-from flexclear.dynamics.compile import sources
 from flexclear.dynamics.linear.bench import Bench, balance, hold
 from flexclear.dynamics.linear.tangent import Tangent, damping, stiffness, tangent
 from flexclear.dynamics.linear.vibrations import vibrations
@@ -96,12 +95,6 @@ def test_friction_at_rest_is_a_strong_damper() -> None:
     rate = 1.5 * static * mass * g / slow * (1.0 / mass + radius**2 / inertia)
     # its arm is shorter than its radius by the depth of the contact, 4e-5 of it
     assert np.sort(found.decay_rate.values)[-2:] == pytest.approx([rate, rate], rel=1e-3)
-
-
-def test_what_python_runs_brings_no_compiler() -> None:
-    made = sources.rates(pose(load_scene(TREE / "scenes/checks/pendulum.toml"))[0].model.parts)
-    assert "calls" not in made
-    assert "specialise" not in made
 
 
 #: a turn of the world about no axis of its own, and its axes then

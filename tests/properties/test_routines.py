@@ -1,4 +1,7 @@
-"""Routines compute what kernels do: rates, what steps read besides, and reports; and one code serves any length."""
+"""Compiled lists of calls compute what the same calls do in Python: rates, what steps read besides, and reports.
+
+`test_articulated` and `test_recorded_states` compare what they compute with mechanics.
+"""
 
 import ctypes
 from dataclasses import replace
@@ -9,24 +12,27 @@ import pytest
 
 from benchmarks.families import turning
 from benchmarks.families.growth import four_bars
-from flexclear.dynamics import joints
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics import closures, flexible, trees
+from flexclear.dynamics.joints import JOINTS
+from flexclear.dynamics.joints.rotation_vector import SERIES_ANGLE, series
+from flexclear.dynamics.joints.rotation_vector import closed as closed_forms
+from flexclear.dynamics.mechanics import closures, flexible, modes, shapes, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
-from flexclear.dynamics.mechanics.joints import JOINTS, SERIES_ANGLE, _closed, series
-from flexclear.dynamics.mechanics.of_topology import list_of
-from flexclear.dynamics.mechanics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
+from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
+from flexclear.dynamics.mechanics.of_topology import list_of, mechanism_of
+from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
+from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.routines.store import load
-from flexclear.dynamics.run.evaluation import engine, specialised_code
-from flexclear.dynamics.run.evaluation.engine import Engine
+from flexclear.dynamics.run.evaluation import engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.dynamics.specialise.topology import topology_of
+from flexclear.dynamics.vectors import ZERO, Inertia, Matrix, Symmetric, Vector, Wrench, cross
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
@@ -49,7 +55,7 @@ from tests.properties.test_articulated import (
     massless,
 )
 
-#: of the largest rate of a kind; measured 5e-12 at worst: kernels refer wrenches to a distant origin
+#: of the largest rate of a kind: sums are taken in another order
 ROUNDING = 1e-10
 SCENES = (
     *("checks/bennett", "checks/bricard", "checks/door", "checks/four_bars_2", "checks/free_body", "checks/heavy_top"),
@@ -59,17 +65,32 @@ SCENES = (
 #: mechanisms that the units make up, without clearance
 CLOSED = [name for name in UNITS if "loose" not in name and "clearance" not in name]
 _EVALUATE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 4, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
-#: laws of time that leave those of the kernels' evaluation
+#: laws of time that leave those of the evaluation in Python
 NO_LAWS = ctypes.CFUNCTYPE(ctypes.c_int64)(lambda: 0)
 
 
-def by_routines(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
-    """The work space w, and n, after an evaluation by routines of what kernels have evaluated; results are new."""
+def without_results(found: Evaluated) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, int]:
+    """h, w and n of what was evaluated in Python, without what steps read; places of the state and its rates."""
     model, space = found.model, found.space
-    h, f, w, n = space.h.copy(), model.arrays.f, space.w.astype(float), space.n.copy()
+    h, w, n = space.h.copy(), space.w.astype(float), space.n.copy()
     y, dy, rows = int(h[m.Y]), int(h[m.SLOPES]), model.arrays.size(m.N_CLOSURE_ROWS)
     for begin, count in ((dy, model.ny), (h[m.RESIDUAL], rows), (h[m.RESIDUAL_RATE], rows), (h[m.PIVOT], min(rows, 1))):
         w[begin : begin + count] = np.nan
+    return h, w, n, y, dy
+
+
+def by_numbers(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
+    """As `by_routines`, on numbers in Python."""
+    model, (h, w, n, y, dy) = found.model, without_results(found)
+    calls = Numbers(h, model.arrays.f, w, n, y, dy)
+    evaluated_by(mechanism_of(Tables(model.parts, topology_of(model.arrays, h))), calls)
+    n[[m.EVALUATION, m.ABRIDGED, m.STATE]] = calls.report, 1, y
+    return w, n
+
+
+def by_routines(found: Evaluated) -> tuple[np.ndarray, np.ndarray]:
+    """The work space w, and n, after an evaluation by a compiled list of what was evaluated in Python."""
+    model, f, (h, w, n, y, dy) = found.model, found.model.arrays.f, without_results(found)
     calls = load(list_of(model.parts, topology_of(model.arrays, h)), silent_text).instance(h)
     h[m.PRESCRIBE], h[m.CALLS] = ctypes.cast(NO_LAWS, ctypes.c_void_p).value, calls.words.ctypes.data
     _EVALUATE(calls.loaded.interpreter)(*(array.ctypes.data for array in (h, f, w, n)), 0.1, y, dy)
@@ -82,7 +103,12 @@ def silent_text(text: str) -> None:
 
 def assert_alike(found: Evaluated) -> None:
     """Rates of positions, speeds and ledger; residuals, rates and pivots of the loops; the report."""
-    model, h, (w, n) = found.model, found.h, by_routines(found)
+    for w, n in (by_routines(found), by_numbers(found)):
+        assert_same(found, w, n)
+
+
+def assert_same(found: Evaluated, w: np.ndarray, n: np.ndarray) -> None:
+    model, h = found.model, found.h
     rates, speeds = w[h[m.SLOPES] :][: model.ny], model.speeds
     for part in (slice(speeds.start), speeds, slice(speeds.stop, None)):
         assert apart(rates[part], found.rates[part].astype(float)) < ROUNDING
@@ -101,25 +127,25 @@ def assert_alike(found: Evaluated) -> None:
 
 
 @pytest.mark.parametrize("name", TREES)
-def test_trees_move_as_by_kernels(name: str) -> None:
+def test_trees_move_as_in_python(name: str) -> None:
     assert_alike(evaluated(tabulated(Scene.model_validate(TREES[name]))))
 
 
 @pytest.mark.parametrize("name", [name for name in BENT if "friction" not in name])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_flexible_bodies_move_as_by_kernels(name: str) -> None:
+def test_flexible_bodies_move_as_in_python(name: str) -> None:
     assert_alike(evaluated(tabulated(Scene.model_validate(BENT[name]))))
 
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_scenes_move_as_by_kernels(name: str) -> None:
+def test_scenes_move_as_in_python(name: str) -> None:
     """Loops with redundant rows, drives of joints and of paths in loops."""
     assert_alike(evaluated(tabulate(build(load_scene(TREE / f"scenes/{name}.toml"), {}))))
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_joints_of_several_coordinates_close_loops_as_by_kernels() -> None:
+def test_joints_of_several_coordinates_close_loops_as_in_python() -> None:
     assert_alike(evaluated(tabulate(build(Scene.model_validate(two_loops()), {}))))
 
 
@@ -147,7 +173,7 @@ def opened(number: int) -> Model:
 
 @pytest.mark.parametrize("number", range(20))
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_random_mechanisms_move_as_by_kernels(number: int) -> None:
+def test_random_mechanisms_move_as_in_python(number: int) -> None:
     for model in (closed(number), opened(number)):
         assert_alike(evaluated(model))
 
@@ -172,13 +198,13 @@ def bent(number: int) -> Model:
 
 @pytest.mark.parametrize("number", range(20))
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_random_flexible_mechanisms_move_as_by_kernels(number: int) -> None:
+def test_random_flexible_mechanisms_move_as_in_python(number: int) -> None:
     assert_alike(evaluated(bent(number)))
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_rounding_does_not_grow_with_the_distance_from_the_origin() -> None:
-    """A thousand sizes away, against the same equations in extended precision; kernels leave 2e-10."""
+    """A thousand sizes away, against the same equations in extended precision."""
     random, setting = np.random.default_rng(0), movable.Setting(p=(-281.0, 870.0, -602.0))
     table = movable.scene(UNITS["spherical five-bar"](random), random, setting, load=GRAVITY)
     exact = evaluated(tabulate(build(Scene.model_validate(table), {})), number=np.longdouble)
@@ -192,7 +218,8 @@ def test_rounding_does_not_grow_with_the_distance_from_the_origin() -> None:
 def test_coordinates_that_move_no_mass_are_noticed(coaxial: bool) -> None:
     with np.errstate(invalid="ignore"):
         found = evaluated(tabulated(Scene.model_validate(massless(coaxial))))
-    assert by_routines(found)[1][m.EVALUATION] == found.report == (m.NOT_POSITIVE if coaxial else m.OK)
+    for evaluate in (by_routines, by_numbers):
+        assert evaluate(found)[1][m.EVALUATION] == found.report == (m.NOT_POSITIVE if coaxial else m.OK)
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
@@ -202,14 +229,11 @@ def test_dependent_rows_are_a_singular_pose() -> None:
     everything = np.ones(found.model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
     assert by_routines(found)[1][m.EVALUATION] == m.OK
     selection.write(found.model, found.h, everything)
-    assert by_routines(found)[1][m.EVALUATION] == m.SINGULAR
+    for evaluate in (by_routines, by_numbers):
+        assert evaluate(found)[1][m.EVALUATION] == m.SINGULAR
 
 
 # Joints ---------------------------------------------------------------------------------------------------------------
-def test_every_joint_type_has_a_row() -> None:
-    assert set(JOINTS) == set(joints.JOINTS)
-
-
 def positions(kind: str, random: np.random.Generator, scale: float) -> np.ndarray:
     """Random positions of a joint; quaternions of another norm than 1."""
     return scale * random.normal(size=len(joint_type(kind).POSITIONS))
@@ -226,7 +250,7 @@ def test_motions_of_joints_are_rates_of_their_poses(kind: str, scale: float) -> 
     def twist(x: np.ndarray) -> np.ndarray:
         return np.concatenate(trees.total(joint.motion(x.tolist(), u.tolist()).S, u.tolist()))
 
-    rate = np.array(joint.rate(x.tolist(), u.tolist()))
+    rate = np.array(joint.position_rate(x.tolist(), u.tolist()))
     ahead, behind = (joint.motion((x + side * step * rate).tolist(), u.tolist()) for side in (1.0, -1.0))
     here = joint.motion(x.tolist(), u.tolist())
     R, dR = np.reshape(here.R_FG, (3, 3)), np.subtract(ahead.R_FG, behind.R_FG).reshape(3, 3) / (2.0 * step)
@@ -249,7 +273,7 @@ def test_positions_of_joints_are_those_that_poses_have(kind: str) -> None:
 
 def test_series_of_rotation_vectors_go_over_into_closed_forms() -> None:
     """The rates of the coefficients, which are differences over the squared angle of 0.01, lose four digits more."""
-    found, exact = (of(SERIES_ANGLE) for of in (series, _closed))
+    found, exact = (of(SERIES_ANGLE) for of in (series, closed_forms))
     assert found[:3] == pytest.approx(exact[:3], abs=1e-13)
     assert found[3:] == pytest.approx(exact[3:], abs=1e-11)
 
@@ -271,7 +295,8 @@ def test_a_shape_moves_mass_or_rounding(mass: float, sound: float) -> None:
         Inertia(*inertia_parts(np.random.default_rng(6))), none[0], none, [[1.0], [1.0, 1.0 + mass]], [0.0] * 2
     )
     with np.errstate(invalid="ignore"):
-        assert flexible.eliminate(body, [], np.float64(1.0))[-1] == sound
+        given = trees.Resistance(body.I, body.F), body.P, body.m, body.forces, shapes.none_taken(2)
+        assert shapes.eliminate(1, *given, [], np.float64(1.0))[-1] == sound
 
 
 @pytest.mark.parametrize(
@@ -312,52 +337,56 @@ def inertia_parts(random: np.random.Generator) -> tuple[Symmetric, Matrix, Symme
 
 
 # Steps ----------------------------------------------------------------------------------------------------------------
-def long(scene: Scene) -> Engine:
-    """The engine of a scene as if it were too long for specialised code."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(specialised_code, "INTERPRETED", True)
-        return engine_of(scene, {}, silent)
-
-
 #: ways of steps, and what makes the engine take them
 WAYS: dict[str, tuple[str, Any]] = {
-    "kernels": ("INTERPRETED", True),
     "list": ("address", lambda *given, **more: 0),
+    "list of a fifth selection": ("SELECTIONS", 0),
     "straight code": ("SELECTIONS", 4),
 }
 
 
-def test_bodies_with_many_modes_step_by_kernels() -> None:
-    """Routines have a number per product of modes: 280 modes took more than 3 GB to compile, and did not end."""
-    body = turning.CASES["1-clamped-free"]()
-    one = engine_of(Scene.model_validate(turning.turning(body, 100.0)), {"rod": turning.reduced(body)}, silent)
-    assert one.model.arrays.size(m.MOST_MODES) > engine.MOST_MODES
-    one.settle(silent)
-    assert one.h[m.RATES] == one.h[m.EVALUATE] != 0
+@pytest.mark.parametrize("number", range(8))
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_shapes_in_blocks_move_as_in_python(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Held shapes, frames on bodies, bodies on these, loops, stiffening; most have blocks of unequal sizes."""
+    monkeypatch.setattr(modes, "FEW", 1)
+    monkeypatch.setattr(modes, "SIZE", 2)
+    assert_alike(evaluated(bent(number)))
+
+
+@pytest.mark.parametrize("case", ["1-clamped-free", "3a"])
+def test_codes_do_not_multiply_with_modes(case: str) -> None:
+    """Bodies of 79 and 280 modes: codes repeat, and are short."""
+    body = turning.CASES[case]()
+    scene = Scene.model_validate(turning.turning(body, 100.0))
+    found = evaluated(tabulate(build(scene, {"rod": turning.reduced(body)})))
+    assert_same(found, *by_numbers(found))
+    codes = list_of(found.model.parts, topology_of(found.model.arrays, found.h)).codes
+    assert len(codes) < 200  # measured 60 to 140
+    assert sum(len(code.program.block) for code in codes) < 50_000  # 25 000; each product once would be a million
 
 
 def by_ways(scene: Scene) -> dict[str, Trajectory]:
     """Runs of a scene whose steps evaluate in each way."""
-    engines, runs = {way: long(scene) for way in WAYS}, {}
+    engines, runs = {way: engine_of(scene, {}, silent) for way in WAYS}, {}
     for way, one in engines.items():
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(engine, *WAYS[way])
-            assert not one.has_specialised_code
             runs[way] = integrate(one, consistent_start(one), silent)
-        assert bool(one.h[m.CALLS]) == (way == "list")
-        assert (one.h[m.RATES] == one.h[m.EVALUATE]) == (way == "kernels")
+        assert bool(one.h[m.CALLS]) == (way != "straight code")
+        assert one.h[m.RATES] != one.h[m.EVALUATE]
     return runs
 
 
 def test_steps_of_long_mechanisms_run_on_routines() -> None:
     runs = by_ways(four_bars(3, 0.3))
-    assert all(apart(run.state, runs["kernels"].state) < 1e-9 for run in runs.values())
+    assert all(apart(run.state, runs["straight code"].state) < 1e-9 for run in runs.values())
 
 
 def test_a_list_belongs_to_the_rows_that_are_selected(monkeypatch: pytest.MonkeyPatch) -> None:
     """With rows that depend on others the same pose is singular."""
     monkeypatch.setattr(engine, *WAYS["list"])
-    one = long(load_scene(TREE / "scenes/checks/four_bars_2.toml"))
+    one = engine_of(load_scene(TREE / "scenes/checks/four_bars_2.toml"), {}, silent)
     y, lists, reports = consistent_start(one), [], []
     kept = one.selected.copy()
     for rows in (kept, np.ones_like(kept), kept):

@@ -1,8 +1,6 @@
-"""Straight code for one topology computes what the kernels do, with any numbers, and is made again for no number."""
+"""Straight code for one topology computes what its calls do, with any numbers, and is made again for no number."""
 
-from contextlib import suppress
 from ctypes import CFUNCTYPE, c_void_p
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,55 +11,31 @@ from llvmlite import ir
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.choice import repeat
 from flexclear.dynamics.compile import compiler_process, files, functions, machine_code, sources
-from flexclear.dynamics.kernels import kernel
 from flexclear.dynamics.mechanics.of_topology import program_of
-from flexclear.dynamics.model import initial, selection
 from flexclear.dynamics.model.mechanism import build
-from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.run import engine_of, observe_run
+from flexclear.dynamics.run.run import engine_of
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.dynamics.sensitivity.dataset import sensitivities
-from flexclear.dynamics.specialise import dual
 from flexclear.dynamics.specialise import program as tracing
 from flexclear.dynamics.specialise.code import Emitter, Program
-from flexclear.dynamics.specialise.program import program
+from flexclear.dynamics.specialise.symbols import new_tape, repeat
 from flexclear.dynamics.specialise.tape import FLOAT, Symbol, UnsuitedError
 from flexclear.dynamics.specialise.topology import topology_of
-from flexclear.dynamics.specialise.trace import Memory, Trace
 from flexclear.scene.load import edited, load_scene
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.properties import tapes
+from tests.properties.articulated_chains import evaluated
 
 CHECKS = sorted((TREE / "scenes/checks").glob("*.toml"))
 RIGID = [path for path in CHECKS if not load_scene(path).flexible()]
 #: of the largest rate of a kind: sums are taken in another order, and a reciprocal stands for a quotient
 ROUNDING = 1e-9
-
-
-def rates_kernel(model: Model) -> Any:
-    """The kernel that the specialised code is made from."""
-    scope: dict[str, Any] = {}
-    exec(sources.specialised(model.parts, (), sources.WHOLE).partition("TOPOLOGY")[0], scope)
-    return scope["rates"]
-
-
-def keep_independent(model: Model, h: np.ndarray, y: int, dy: int, w: np.ndarray, n: np.ndarray, kernel: Any) -> None:
-    """Solve for as many closure rows as are independent, where some follow from others."""
-    mobility = analyse(model)
-    if not mobility.redundant:
-        return
-    with suppress(ZeroDivisionError):  # by a pivot of dependent rows, after their Jacobian
-        Trace(0).plain(kernel)(h.tolist(), model.arrays.f, w, n, y, dy)
-    J = selection.dense_rows(model, h, w[h[m.JACOBIAN] :][: h[m.JACOBIAN_SIZE]])
-    kept, _ = selection.choose(J, np.ones(len(J)), mobility.rank)
-    selection.write(model, h, kept)
 
 
 def apart(model: Model, one: np.ndarray, other: np.ndarray) -> float:
@@ -73,27 +47,10 @@ def apart(model: Model, one: np.ndarray, other: np.ndarray) -> float:
     return worst
 
 
-def test_what_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_would_be_too_long_is_refused() -> None:
     model = tabulate(build(load_scene(TREE / "scenes/checks/pendulum.toml"), {}))
-    monkeypatch.setattr(tracing, "LONGEST", 10)
     with pytest.raises(UnsuitedError, match="too long"):
-        program(rates_kernel(model), topology_of(model.arrays, model.arrays.work_space(m.Room(2, 0)).h))
-
-
-def description_kernel(model: Model) -> Any:
-    """The kernel of what is recorded of an evaluation."""
-    scope: dict[str, Any] = {}
-    exec(sources.specialised(model.parts, (), sources.DESCRIBED).partition("TOPOLOGY")[0], scope)
-    return scope["description"]
-
-
-def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> float:
-    """Of two work spaces, as share of the largest number of a stretch."""
-    stretches, worst = [*m.STRETCHES.values(), *(table.at for table in m.TABLES["w"])], 0.0
-    for begin, end in pairwise(sorted({int(h[index]) for index in stretches} | {len(one)})):
-        a, b = one[begin:end], other[begin:end]
-        worst = max(worst, float(np.abs(a - b).max(initial=0.0)) / max(1.0, float(np.abs(a).max(initial=0.0))))
-    return worst
+        program_of(model.parts, topology_of(model.arrays, model.arrays.h), 10)
 
 
 def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
@@ -103,7 +60,7 @@ def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
     sizes |= {m.NAMED["bends"]: bearings}
     stretches = {table.at: table.size * rows for table, rows in sizes.items()}
     rows, kept = model.arrays.size(m.N_CLOSURE_ROWS), int(h[m.N_KEPT_ROWS])
-    stretches |= {m.RESIDUAL: rows, m.RESIDUAL_RATE: rows, m.PIVOT: 1}
+    stretches |= {m.RESIDUAL: rows, m.RESIDUAL_RATE: rows, m.PIVOT: min(rows, 1)}
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[:kept]
     diagonal = h[m.SCHUR] + envelope["origin"] + np.arange(kept)
     scales = h[m.ROW_SCALE] + rows + np.arange(kept)
@@ -113,46 +70,24 @@ def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
 
 @pytest.mark.parametrize("path", RIGID, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All without a compiler: kernels on numbers, what they wrote on the tape, and what routines did; contacts open
-    and closed.
-
-    What steps read, all of the work space, and with what is recorded; also of what would be too long.
-    """
-    monkeypatch.setattr(tracing, "LONGEST", 200_000)
+def test_every_scene_is_evaluated_alike(path: Path) -> None:
+    """All without a compiler: calls on numbers that store the record, and what those of steps wrote on a tape; contacts
+    open and closed. What steps read."""
     model = tabulate(build(load_scene(path), {}))
-    space, f = model.arrays.work_space(m.Room(2, 0)), model.arrays.f
-    h, y, dy = space.h, int(space.h[m.Y]), int(space.h[m.SLOPES])
-    kernel, described, start = rates_kernel(model), description_kernel(model), initial.start_state(model)
-    space.w[y : y + model.ny] = start
-    keep_independent(model, h, y, dy, space.w.copy(), space.n.copy(), kernel)
-    topology = topology_of(model.arrays, h)
-    tape, whole = program_of(model.parts, topology, 200_000), program(kernel, topology, 200_000)
-    record = program(described, topology, 200_000, describes=True)
-    start[model.speeds] += np.random.default_rng(1).normal(size=model.nv)
     for closed in (0, 1):
-
-        def begun(modes: int = closed) -> dict[str, np.ndarray]:
-            w, n = space.w.copy(), space.n.copy()
-            n[n[m.MODE] :], w[y : y + model.ny] = modes, start
-            w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
-            return {"f": f, "w": w, "n": n}
-
-        by_kernels, by_tape, by_whole = begun(), begun(), begun()
-        Trace(0).plain(kernel)(h.tolist(), f, by_kernels["w"], by_kernels["n"], y, dy)
-        tapes.run(tape, h, by_tape, y, dy)
-        tapes.run(whole, h, by_whole, y, dy)
-        assert [arrays["n"][m.ABRIDGED] for arrays in (by_kernels, by_tape, by_whole)] == [0, 1, 0]
-        assert all(arrays["n"][m.EVALUATION] == m.OK for arrays in (by_kernels, by_tape, by_whole))
-        one, other = by_kernels["w"], by_tape["w"]
-        assert apart(model, one[dy : dy + model.ny], other[dy : dy + model.ny]) < ROUNDING
-        for read in read_by_steps(model, h):
-            room = ROUNDING * np.abs(one[read]).max(initial=1.0)
-            assert other[read] == pytest.approx(one[read], rel=ROUNDING, abs=room)
-        assert largest_difference(h, one, by_whole["w"]) < ROUNDING
-        Trace(0).plain(described)(h.tolist(), f, by_kernels["w"], by_kernels["n"])
-        tapes.run(record, h, by_whole, y, dy)
-        assert largest_difference(h, one, by_whole["w"]) < ROUNDING
+        found = evaluated(model, speeds=1.0, closed=closed)
+        h, w, n = found.h, found.w.copy(), found.n.copy()
+        y, dy = int(h[m.Y]), int(h[m.SLOPES])
+        places = read_by_steps(model, h)
+        for place in (slice(dy, dy + model.ny), *places):
+            w[place] = np.nan
+        tape = program_of(model.parts, topology_of(model.arrays, h), 200_000)
+        tapes.run(tape, h, {"f": model.arrays.f, "w": w, "n": n}, y, dy)
+        assert (n[m.ABRIDGED], n[m.EVALUATION], found.report) == (1, m.OK, m.OK)
+        assert apart(model, found.rates, w[dy : dy + model.ny]) < ROUNDING
+        for read in places:
+            room = ROUNDING * np.abs(found.w[read]).max(initial=1.0)
+            assert w[read] == pytest.approx(found.w[read], rel=ROUNDING, abs=room)
 
 
 def engine(integrator: str = "dop853") -> Engine:
@@ -160,47 +95,24 @@ def engine(integrator: str = "dop853") -> Engine:
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that reads more of some evaluations than the rates
-def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A stroke with impacts, as exactly as its own tolerance tells, with equal events; so for what is too long."""
-    alone = engine(integrator)
-    with monkeypatch.context() as patch:
-        patch.setattr(specialised_code, "INTERPRETED", True)
-        general = engine(integrator)
-    assert (alone.has_specialised_code, general.has_specialised_code) == (True, False)
-    straight, kernels = (integrate(one, consistent_start(one), silent) for one in (alone, general))
-    assert alone.h[m.RATES] != alone.h[m.EVALUATE]
-    assert straight.events["kind"].tolist() == kernels.events["kind"].tolist()
-    # before the first impact, whose instants differ by rounding; each of those that follow magnifies it
-    first = float(kernels.events["time"][0]) - 1e-9
-    before = [run.state[run.time <= first][:, : alone.model.nq] for run in (kernels, straight)]
-    assert np.abs(before[0] - before[1]).max() < 1e-9
-    for k in (0, len(kernels.rows) // 2):
-        rates = []
-        for one, address in ((general, m.EVALUATE), (alone, m.EVALUATE), (alone, m.RATES)):
-            one.select_pieces_after(kernels.time[k])
-            one.h[m.EVALUATE], before_it = one.h[address], one.h[m.EVALUATE]
-            rates.append(closure_rows.evaluate(one, kernels.state[k], kernels.time[k]))
-            one.h[m.EVALUATE] = before_it
-        assert all(apart(alone.model, rates[0], other) < ROUNDING for other in rates[1:])
-    seen = [observe_run(one, kernels) for one in (general, alone)]
-    for name in ("link_wrenches", "closure_wrenches", "drive_force", "energy"):
-        a, b = (getattr(one, name) for one in seen)
-        fields = a.dtype.names or [...]
-        assert all(np.abs(a[k] - b[k]).max() <= 1e-6 * np.abs(a[k]).max() for k in fields), name
+def test_compiled_steps_evaluate_as_the_record_does(integrator: str) -> None:
+    """Straight code of the steps, and the list that stores all, at states of a stroke with impacts."""
+    one = engine(integrator)
+    run = integrate(one, consistent_start(one), silent)
+    assert one.h[m.RATES] != one.h[m.EVALUATE]
+    for k in (0, len(run.rows) // 2):
+        one.select_pieces_after(run.time[k])
+        rates, before = [closure_rows.evaluate(one, run.state[k], run.time[k])], one.h[m.EVALUATE]
+        assert not one.n[m.ABRIDGED]
+        one.h[m.EVALUATE] = one.h[m.RATES]
+        rates.append(closure_rows.evaluate(one, run.state[k], run.time[k]))
+        one.h[m.EVALUATE] = before
+        assert one.n[m.ABRIDGED]
+        assert apart(one.model, *rates) < ROUNDING
 
 
-def test_friction_of_ideal_joints_is_iterated_by_the_kernels_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, rates = load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), []
-    for general in (False, True):
-        monkeypatch.setattr(specialised_code, "INTERPRETED", general)
-        one = engine_of(scene, {}, silent)
-        assert one.has_specialised_code == (not general)
-        rates.append(closure_rows.evaluate(one, consistent_start(one), one.start))
-    assert apart(one.model, *rates) < ROUNDING
-
-
-def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tracing, "LONGEST", 10)
+def test_what_is_too_long_runs_a_list_and_is_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tracing, "LONGEST_STRAIGHT", 10)
     monkeypatch.setattr(specialised_code, "_known", {})
     scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
     with monkeypatch.context() as patch, TemporaryDirectory() as folder:
@@ -209,8 +121,8 @@ def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeyp
         patch.setattr(files, "loaded", {})
         patch.setattr(functions, "loaded", files.loaded)
         one = engine_of(scene, {}, silent)
-        assert not one.has_specialised_code
         assert integrate(one, consistent_start(one), silent).time[-1] == 0.01
+        assert one.h[m.CALLS]
         made = sensitivities(scene, {}, silent, ["hinge.velocity.final"], ["load.gravity.acceleration.1"])
         # as long as it hangs still, its rate grows with gravity
         rate = made["hinge.velocity.final"].item() * -9.81
@@ -225,8 +137,10 @@ def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
     fewer = kept.copy()
     fewer[-1] = False
     one.keep(fewer)
+    one.connect()
     assert one.h[m.RATES] == one.h[m.EVALUATE]
     one.keep(kept)
+    one.connect()
     assert one.h[m.RATES] == straight
 
 
@@ -246,33 +160,29 @@ def test_equal_topologies_give_equal_code(lanes: int) -> None:
     assert reported() == reported()
 
 
-def test_friction_of_ideal_joints_is_in_what_steps_evaluate_and_not_in_linear_analyses() -> None:
+def test_friction_of_ideal_joints_is_in_what_steps_evaluate() -> None:
     parts = tabulate(build(load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), {})).parts
     assert "joint_friction" in sources.specialised(parts, ())
-    assert "joint_friction" not in sources.rates(parts)
 
 
 def test_a_magnitude_is_never_below_zero_and_may_be_below_more() -> None:
-    tape = Trace(100).tape
+    tape = new_tape(100)
     x = tape.write(FLOAT, "load", "w", 0)
     assert (abs(x) < 0.0) is False
     assert (abs(x) < 0.0) is False
     assert all(isinstance(one, Symbol) for one in (abs(x) < 0.5, x < 0.0, abs(x) > 0.0))
 
 
-@kernel
-def halve_error(w):
-    """A turn of Newton's method for the root w[0] of w[1]; w[2] counts."""
-    before = w[0]
-    w[0] = 0.5 * (before + w[1] / before)
-    w[2] += 1.0
-    return abs(w[0] - before) > 1e-9 * before
+def root(x: Any) -> tuple[Any, Any]:
+    """The root of the second number from the first one on, by Newton's method, and the number of its turns."""
 
+    def halve_error(state: Any) -> tuple[Any, Any]:
+        before, turns = state
+        after = 0.5 * (before + x[1] / before)
+        return abs(after - before) > 1e-9 * before, (after, turns + 1.0)
 
-@kernel
-def find_root(w):
-    w[2] = 0.0
-    repeat(halve_error, w)
+    found: tuple[Any, Any] = repeat(halve_error, (x[0], 0.0))
+    return found
 
 
 @pytest.mark.parametrize("lanes", [1, 4])
@@ -281,11 +191,10 @@ def test_lanes_of_a_loop_turn_as_often_as_each_alone(lanes: int) -> None:
     states = np.array([[2.0, 4.0, np.nan], [1.0, 2.0, np.nan], [1.0, 1e6, np.nan], [1.0, 1e15, np.nan]])
     known = states.copy()
     for row in known:
-        dual.plain(find_root)(row)
-    trace = Trace(100)
-    w = Memory(trace, "w", FLOAT)
-    trace.plain(find_root)(w)
-    made = Program(trace.tape.block, [("w", index, value) for index, value in w.values.items()])
+        row[[0, 2]] = root(row)
+    tape = new_tape(100)
+    found = root([tape.write(FLOAT, "load", "w", index) for index in (0, 1)])
+    made = Program(tape.block, [("w", index, value) for index, value in zip((0, 2), found, strict=True)])
     function = ir.Function(ir.Module("m"), ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()]), "f")
     builder = ir.IRBuilder(function.append_basic_block())
     where = lambda array, index, lane: builder.gep(function.args[0], [INT(3 * lane + index)])  # noqa: E731

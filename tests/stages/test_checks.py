@@ -154,6 +154,12 @@ WRONG = {
             "event.b.at": ('at = "slider.position.x < ', "'slider.position.x < 0.3 m' is already true"),
         },
     ),
+    "event that is true where a pin starts pressed into its journal": (
+        {},
+        '[event.a]\nat = "B.normal_force > 0.1 N"\nrelease = "joint.guide"\n'
+        '[event.b]\nat = "slider.position.x < 0.2 m"\nrelease = "joint.A"\n',
+        {"event.a.at": ('at = "B.', "'B.normal_force > 0.1 N' is already true at the start of the run")},
+    ),
     "angle without digits": (
         {'"polynomial", coefficients = ["40 deg", "300 rpm"]': '"harmonic", amplitude = 1, frequency = "1e30 Hz"'},
         "",
@@ -177,6 +183,46 @@ def test_check_and_run_report_the_same_errors_with_file_and_line(
         said = command(verb, scene, code=2).err
         for key, (written, words) in expected.items():
             assert f"{scene} [{key}], line {text[: text.index(written)].count(chr(10)) + 1}: {words}" in said
+        assert said.count(f"{scene} [") == len(expected)
+
+
+#: scene, what is added to it -> key and words of its error; where a condition is true, and where a velocity is wrong,
+#: follows from closed forms
+STARTS = {
+    "equilibrium": (
+        "spring_pendulum",
+        # 0.8 m + 9.81 m/s^2 1 kg / (500 N/m) = 0.81962 m; the scene's pose is at 0.79962 m
+        '[start]\nat = "equilibrium"\n[event.a]\nat = "ball.position.z < -0.8196 m"\nrelease = "load.spring"\n'
+        '[event.b]\nat = "ball.position.z < -0.8197 m"\nrelease = "load.gravity"\n',
+        {"event.a.at": "is already true at the start of the run"},
+    ),
+    "flexible body": (
+        "flexible_slider_crank",
+        # both rods in line: 150 mm + 300 mm
+        '[event.a]\nat = "slider.position.x > 0.4499 m"\nrelease = "joint.guide"\n'
+        '[event.b]\nat = "slider.position.x > 0.4501 m"\nrelease = "joint.slider_pin"\n',
+        {"event.a.at": "is already true at the start of the run"},
+    ),
+    "velocity next to a flexible body": (
+        "flexible_slider_crank",
+        "[set.body.slider]\nvelocity = [0, 1, 0]\n",  # the guide is along x
+        {"body.slider.velocity": "joints and drives do not allow the given velocities of slider"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_check_finds_the_start_of_the_run(name: str, tmp_path: Path, command: Command, fresh: Path) -> None:
+    """Also that of flexible bodies, and poses that the scene does not give; with the words of the run."""
+    base, more, expected = STARTS[name]
+    scene = tmp_path / "own.toml"
+    scene.write_text(f'extends = "{Path(__file__).parents[2] / "scenes/checks" / base}.toml"\n{more}')
+    for verb in ("check", "run") if name == "equilibrium" else ("check",):
+        said = command(verb, scene, code=2).err
+        for key, words in expected.items():
+            line = more.split(key.removesuffix(".at").replace(".velocity", "]\nvel"))[0].count(chr(10)) + 3
+            assert f"{scene} [{key}], line {line}: " in said
+            assert words in said
         assert said.count(f"{scene} [") == len(expected)
 
 

@@ -7,20 +7,18 @@ Source: Wang & Wang (2019), eq. (26), of spheres.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from flexclear.dynamics.contact.hertz import published, relative_radius, sphere_stiffness
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import axis, dot, radial, scale, sub
+from flexclear.dynamics.contact.surfaces.separation import Separation, across, nested
+from flexclear.dynamics.vectors import Matrix, Vector
 from flexclear.scene.loose_joints import BallInTube
 
 
-@kernel
-def separation(axes, numbers, p, v):
-    """Return the same as `clearance_spherical.separation`, for the components of p and v across the tube's axis."""
-    z = axis(axes, 2)
-    across = sub(p, scale(dot(z, p), z))
-    distance, rate, normal, turning = radial(across, sub(v, scale(dot(z, v), z)))
-    return numbers.clearance - distance, rate, normal, turning, across
+def separation(numbers: Any, R_WA: Matrix, p: Vector, v: Vector) -> Separation:
+    """Return the separation across the tube's axis z."""
+    z = R_WA.column(2)
+    return nested(numbers.clearance, across(z, p), across(z, v))
 
 
 stiffness = published({1.5: sphere_stiffness})

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from flexclear.dynamics.joints.coordinate import Coordinate, rates_are_speeds
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import IDENTITY, ZERO
+from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.joints.relative import Relative, rates_are_speeds
+from flexclear.dynamics.vectors import AXES, UNIT, ZERO, Twist, Vector
 
 
-@kernel
-def motion(w, x, u, S):
-    """Motion of frame G in frame F: metres along x, then along y (see `spherical.motion`)."""
-    for k in range(12):
-        w[S + k] = 0.0
-    w[S + 3] = w[S + 6 + 4] = 1.0
-    return IDENTITY, (w[x], w[x + 1], 0.0), ZERO, ZERO
+def motion(x: Any, u: Any) -> Relative:
+    """Motion of frame G in frame F: metres along x, then along y."""
+    return Relative(UNIT, Vector([*x, 0.0]), [Twist(ZERO, axis) for axis in AXES[:2]])
 
 
-position_rate = rates_are_speeds(2)
+position_rate = rates_are_speeds
 
 POSITIONS, SPEEDS = "tt", "tt"  #: r: rotation [rad or -], t: translation [m]
 TRANSLATIONS: tuple[int, ...] = (2,)

@@ -5,24 +5,18 @@ r"""Drag of a fluid at rest on the origin of a frame: against its velocity, with
 
 from __future__ import annotations
 
-import numpy as np
-
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, number
+from flexclear.dynamics.loads.given import Given, Load
 from flexclear.dynamics.loads.row import Row
-from flexclear.dynamics.vectors import cross, dot, scale
+from flexclear.dynamics.specialise.symbols import sqrt
+from flexclear.dynamics.vectors import ZERO, Wrench, dot
 from flexclear.scene.loads import QuadraticDrag
 
 
-@kernel
-def apply(d, k):
-    """Apply load k; all of its power is lost."""
-    frame = d.site_frames[d.loads[k].b]
-    v = frame.velocity
-    speed = np.sqrt(dot(v, v))
-    force = scale(-number(d, k, 0) * speed, v)
-    moment = cross(frame.origin, force)
-    act(d, k, moment, force, 0.0, 0.0, 0.0, 0.0, -dot(force, v))
+def apply(given: Given) -> Load:
+    """Return the drag; all of its power is lost."""
+    v = given.G.v
+    force = -(given.numbers[0] * sqrt(dot(v, v))) * v
+    return Load(Wrench(ZERO, force), lost=-dot(force, v))
 
 
 def row(load: QuadraticDrag, place: str) -> Row:

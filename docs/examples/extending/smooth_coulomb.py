@@ -8,16 +8,15 @@ Source: Andersson, Soderberg & Bjorklund (2007), Tribology International 40, 580
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
 from flexclear.dynamics.contact.friction.law import Friction, sliding
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import tanh
 
 
-@kernel
-def coefficient(speed, p):
+def coefficient(speed: Any, p: Any) -> Any:
     """Mu [-] at the sliding speed [m/s] >= 0; p = (mu_d, v_s, -, -, -, -)."""
-    return p[0] * np.tanh(speed / p[1])
+    return p[0] * tanh(speed / p[1])
 
 
 LAW = Friction(sliding(coefficient), constants=lambda law: (law.dynamic, law.v_smooth))

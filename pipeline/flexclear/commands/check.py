@@ -1,6 +1,6 @@
 """``flexclear check``: all errors of scenes, recipes and sweeps at once, with file and line; nothing is run.
 
-The checks take seconds, without modes and without compilation: meshes, the start, free motions.
+The checks take seconds, without compilation: meshes, modes of small ones, the start, free motions.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
@@ -22,17 +22,12 @@ from flexclear.scene.references import dangling_names
 from flexclear.scene.segments import body_frames, cut_segments
 from flexclear.scene.toml_files import read_toml
 from flexclear.scene.variants import ideal, replaceable_contacts
-from flexclear.stages import meshing, modal_analysis, scenes, show, simulation
+from flexclear.stages import meshing, modal_analysis, reduction, scenes, show, simulation
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import add_options
-from flexclear.system.errors import (
-    FlexclearError,
-    InputError,
-    ResourceError,
-    SolverError,
-    errors_of,
-    refuse,
-)
+from flexclear.stages.workplace import add_options, open_workplace
+from flexclear.system.errors import FlexclearError, InputError, ResourceError, SolverError, errors_of, refuse
+from flexclear.system.progress import silent
+from flexclear.workflow.execute import states
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,6 +38,7 @@ if TYPE_CHECKING:
     from flexclear.scene.parts import FlexibleBody
     from flexclear.scene.schema import Scene
     from flexclear.structure.fe import model as fe
+    from flexclear.workflow.task import Task
 
 #: errors about a file: it is wrong, or asks for too much
 MISTAKES = (InputError, ResourceError)
@@ -50,8 +46,9 @@ MISTAKES = (InputError, ResourceError)
 LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
 #: extents of a mesh from a file outside of which its unit of length is doubted [m]
 SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
-#: the start of mechanisms with more free coordinates is checked by the run only
-MOST_COORDINATES = 60
+#: the start of mechanisms with more free coordinates is checked by the run only, as where a flexible body of a mesh
+#: with more unknowns was never reduced
+MOST_COORDINATES, MOST_REDUCED = 60, 1_000
 #: parts without which the start pose of a mechanism is another
 PLACING = ("[drive.", "[start.", "[gear.")
 #: number of unused frames that are listed
@@ -220,6 +217,7 @@ def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
 class Body:
     """A mesh without its modes.  rigid: mass, inertia and frames (schema RIGID).  interfaces: those of the recipe."""
 
+    mesh: xr.Dataset
     model: fe.Model
     rigid: xr.Dataset
     interfaces: tuple[str, ...]
@@ -242,9 +240,8 @@ def compute(whole: Scene, mesh_of: MeshOf, findings: Findings) -> None:
             findings.attempt(partial(_check_modes, bodies[name], name, part), whole.path)
     if set(bodies) != set(whole.recipes()):
         return
-    rigid = {name: body.rigid for name, body in bodies.items()}
-    if findings.attempt(partial(_check_assembly, whole, rigid, findings), whole.path) and not findings.errors:
-        _free_motions(whole, rigid, findings)
+    if findings.attempt(partial(_check_assembly, whole, bodies, findings), whole.path) and not findings.errors:
+        _free_motions(whole, bodies, findings)
 
 
 def body_of_recipe(
@@ -279,7 +276,7 @@ def _mesh_recipe(path: Path, segment: tuple[int, int] | None, findings: Findings
     if 3 * mesh.sizes.get("node", 0) > LARGEST_MESH:
         return
     model = kind.of_mesh(mesh).assemble(mesh)
-    yield Body(model, bundle.rigid_of(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
+    yield Body(mesh, model, bundle.rigid_of(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
 
 
 def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[InputError]:
@@ -320,33 +317,31 @@ def _errors_in_body(name: str) -> Iterator[None]:
         raise InputError(f"[body.{name}.{error.place}]", error.problem, error.remedy) from None
 
 
-def _check_assembly(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
+def _check_assembly(whole: Scene, bodies: Mapping[str, Body], findings: Findings) -> None:
     """Assemble the mechanism at its start, which checks poses, axes, loads and loose joints against each other.
 
-    Flexible bodies are undeformed; of rigid mechanisms rank and drives are checked, too.
+    Flexible bodies are undeformed; where their modes are at hand, and of rigid mechanisms, rank, drives and the start
+    of the run are checked, too.
     """
+    from flexclear.dynamics.analyses import start_refusals
+    from flexclear.dynamics.model.assembly import assemble
     from flexclear.dynamics.model.checks import mechanism_errors
     from flexclear.dynamics.model.plausibility import doubts, start_errors, unused_frames
 
-    mechanism = _mechanism(whole, rigid)
+    mechanism = _mechanism(whole, bodies)
     sound = findings.attempt(lambda: refuse(mechanism_errors(whole, mechanism)), whole.path)
+    moving: list[tuple[Model, Mobility]] = []
     if mechanism.all_rigid and sound:
-        from flexclear.dynamics.model.mobility import analyse
-        from flexclear.dynamics.model.model import tabulate
-        from flexclear.dynamics.run.evaluation.engine import refuse_singular
-
-        model = tabulate(mechanism)
-        mechanism, mobility = model.mechanism, analyse(model)
-        with _as_mistakes():
-            refuse_singular(model, mobility)
+        moving = [_movable(mechanism)]
+        mechanism = moving[0][0].mechanism
     else:
-        from flexclear.dynamics.model.assembly import assemble
-
         mechanism = assemble(mechanism)
-    exact = whole.start is None or whole.start.at != "equilibrium"
-    refuse(start_errors(mechanism, final=exact))
-    if mechanism.all_rigid and sound and exact and model.nv <= MOST_COORDINATES:
-        _check_start(whole, model, mobility, findings)
+    refuse(start_errors(mechanism, final=whole.start is None or whole.start.at != "equilibrium"))
+    reduced = _reduce_bodies(whole, bodies) if sound else None
+    moving = [_movable(_mechanism(whole, bodies, reduced))] if reduced else moving
+    for known in (one for one in moving if one[0].nv <= MOST_COORDINATES):
+        for check in start_refusals(_fill_in_recipes(whole, bodies), reduced or {}, *known):
+            findings.attempt(_as_mistakes()(check), whole.path)
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):
@@ -357,6 +352,45 @@ def _check_assembly(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findin
         findings.notes.append(f"unused frames: {', '.join(unused[:LISTED_FRAMES])}{more}")
 
 
+def _movable(mechanism: Mechanism) -> tuple[Model, Mobility]:
+    """Return the model of a mechanism and how it can move; raise InputError where it cannot."""
+    from flexclear.dynamics.model.mobility import analyse
+    from flexclear.dynamics.model.model import tabulate
+    from flexclear.dynamics.run.evaluation.engine import refuse_singular
+
+    model = tabulate(mechanism)
+    mobility = analyse(model)
+    with _as_mistakes():
+        refuse_singular(model, mobility)
+    return model, mobility
+
+
+def _reduce_bodies(whole: Scene, bodies: Mapping[str, Body]) -> dict[str, xr.Dataset] | None:
+    """Return the flexible bodies with their modes: of small meshes computed, of others from the store; None where one
+    is not there."""
+    reduced: dict[str, xr.Dataset] = {}
+    for name, part in whole.flexible().items():
+        mesh, requested = bodies[name].mesh, reduction.params(whole, name)
+        if bodies[name].model.size <= MOST_REDUCED:
+            with _errors_in_body(name), _as_mistakes():
+                modes = modal_analysis.run(modal_analysis.params(part), {"mesh": mesh}, silent)["nc"]
+            reduced[name] = reduction.run(requested, {"mesh": mesh, "modes": modes}, silent)["nc"]
+        elif found := _stored(Graph(whole).bundle[name]):
+            reduced[name] = found
+        else:
+            return None
+    return reduced
+
+
+def _stored(task: Task) -> xr.Dataset | None:
+    """Return the main file of a task's artifact where that is up to date."""
+    place = open_workplace()
+    if place.store.last(task.folder, task.label) is None:
+        return None
+    record = states([task], place.store, place.sources)[-1].record
+    return None if record is None else place.store.load(record)
+
+
 @contextmanager
 def _as_mistakes() -> Iterator[None]:
     """Turn errors that the run would meet at its start into errors of the scene."""
@@ -364,14 +398,6 @@ def _as_mistakes() -> Iterator[None]:
         yield
     except SolverError as error:
         raise InputError("[start]", str(error)) from None
-
-
-def _check_start(whole: Scene, model: Model, mobility: Mobility, findings: Findings) -> None:
-    """Check what the run refuses at its start, all of which is collected."""
-    from flexclear.dynamics.analyses import start_refusals
-
-    for check in start_refusals(whole, model, mobility):
-        findings.attempt(_as_mistakes()(check), whole.path)
 
 
 def _starts_ideal(whole: Scene) -> bool:
@@ -385,26 +411,33 @@ def _note_choice(whole: Scene, mechanism: Mechanism, findings: Findings) -> None
         findings.warnings.append(lines.with_file_name(InputError("[start]", mechanism.choice), whole.path))
 
 
-def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
+def _fill_in_recipes(whole: Scene, bodies: Mapping[str, Body]) -> Scene:
+    """Return the scene with the numbers of those rigid bodies that recipes describe."""
+    meshed = {f"{simulation.RIGID}{name}": bodies[name].rigid for name in whole.meshed_bodies()}
+    if not meshed:
+        return whole
+    table = whole.model_dump(mode="python", exclude_none=True)
+    table["body"] = simulation.fill_in_recipes(table["body"], meshed)
+    return type(whole).model_validate(table)
+
+
+def _mechanism(whole: Scene, bodies: Mapping[str, Body], bundles: Mapping[str, xr.Dataset] | None = None) -> Mechanism:
+    """Return the mechanism of a scene where it starts; without bundles flexible bodies have no modes."""
     from flexclear.dynamics.model.mechanism import build
     from flexclear.dynamics.run.run import placed
 
-    meshed = {f"{simulation.RIGID}{name}": rigid[name] for name in whole.meshed_bodies()}
-    if meshed:
-        table = whole.model_dump(mode="python", exclude_none=True)
-        table["body"] = simulation.fill_in_recipes(table["body"], meshed)
-        whole = type(whole).model_validate(table)
-    return build(placed(whole), {name: rigid[name] for name in whole.flexible()})
+    whole = _fill_in_recipes(whole, bodies)
+    return build(placed(whole), bundles or {name: bodies[name].rigid for name in whole.flexible()})
 
 
-def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], findings: Findings) -> None:
+def _free_motions(whole: Scene, bodies: Mapping[str, Body], findings: Findings) -> None:
     """Note the free motions besides the drives, with rigid bodies and loose joints closed, where these fit."""
     from flexclear.dynamics.model.mobility import analyse
     from flexclear.dynamics.model.model import tabulate
 
     idealised = bool(replaceable_contacts(whole) or whole.flexible())
     try:
-        model = tabulate(_mechanism(ideal(whole) if idealised else whole, rigid))
+        model = tabulate(_mechanism(ideal(whole) if idealised else whole, bodies))
         free = analyse(model).mobility
     except InputError:  # the mechanism moves only with flexible bodies or with clearance
         return

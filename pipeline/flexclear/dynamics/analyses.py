@@ -6,7 +6,7 @@ The keys of single runs do not depend on this module.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
     from flexclear.system.progress import Progress
+
+#: free coordinates of mechanisms whose ideal start or equilibrium is found without compilation
+MOST_SOUGHT = 12
 
 
 def cost(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, *, checked: bool = True) -> Cost:
@@ -53,28 +56,44 @@ def require_without_events(scene: Scene, what: str) -> None:
         raise InputError(f"[event.{name}]", f"{what} needs a scene without events", 'remove them: remove = ["event"]')
 
 
-def start_refusals(scene: Scene, model: Model, mobility: Mobility) -> Iterator[Callable[[], object]]:
+def start_refusals(
+    scene: Scene, bundles: Mapping[str, Labelled], model: Model, mobility: Mobility
+) -> Iterator[Callable[[], object]]:
     """Yield checks of the start of a scene's run, which raise its errors, without compilation.
 
-    Velocities, paths and surfaces at the start; then actuators, conditions of events and periods of sections.
-    model: of rigid bodies, at the start of the scene or of its ideal mechanism.
+    The start that the scene asks for, its velocities, paths and surfaces; then actuators, conditions of events and
+    periods of sections.  model: at the start, or where the start of another mechanism is still to be found.
     """
     from flexclear.dynamics.run.evaluation.start import consistent_start
-    from flexclear.dynamics.run.evaluation.without_compiler import uncompiled
+    from flexclear.dynamics.run.evaluation.without_compiler import uncompiled, without_compiler
+    from flexclear.dynamics.run.run import engine_of
+    from flexclear.system.progress import silent
 
-    engine, states = uncompiled(model, mobility), []
-    yield lambda: states.append(consistent_start(engine))
-    if not states:
+    found: list[Any] = []
+    at = None if scene.start is None else scene.start.begins
+    # the laws of actuators come from a run; poses of many coordinates, or of modes, take seconds to find in Python
+    actuated = any(getattr(drive, "actuators", None) for drive in scene.drive.values())
+    afar = actuated or (at != "recorded" and (bool(bundles) or model.nv > MOST_SOUGHT))
+
+    def start() -> None:
+        with without_compiler():
+            engine = uncompiled(model, mobility) if at is None or afar else engine_of(scene, bundles, silent)
+            found.extend([engine, consistent_start(engine)])
+
+    if at == "equilibrium" and afar:
+        return
+    yield start
+    if not found:
         return
     from flexclear.dynamics.events.phases import require_false
     from flexclear.dynamics.record.sections import repeated
     from flexclear.dynamics.run.inverse import enough
 
-    yield lambda: enough(engine, states[0])
-    if scene.event and (scene.start is None or scene.start.at is None):
-        yield lambda: require_false(scene, engine, states[0])
+    yield lambda: enough(*found)
+    if scene.event and (at is None or not afar):
+        yield lambda: require_false(scene, *found)
     if scene.sections is not None:
-        yield lambda: repeated(engine, states[0])
+        yield lambda: repeated(*found)
 
 
 def equilibrium(

@@ -19,11 +19,10 @@ knows: a value read from h stays valid after any write to w.  A kernel that writ
 Terms: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
 that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised
 speed; free ones come first, in the order of elimination (descendants before ancestors), prescribed ones after. A
-*column* is the twist (angular velocity; velocity of the point at the kernels' origin) per unit of a coordinate; every
-coordinate has one, and every port one more per moving shape of its body. A *stretch* is an array within w or n.
+*stretch* is an array within w or n.
 
-Modes are in X, U and the state as eigenmodes, in all other arrays with coordinates (DU, BIAS, COLUMNS, MASS, JACOBIAN,
-...) in their body's interface basis (`bodies.interface`).
+Modes are in X, U and the state as eigenmodes, in DU and JACOBIAN in their body's interface basis
+(`model.interface_basis`).
 """
 
 from __future__ import annotations
@@ -54,8 +53,7 @@ STRETCHES: dict[str, int] = {}
 #: single floats of w by the names that kernels use: the index of their stretch in the header, and their offset there
 FLOATS: dict[str, tuple[int, int]] = {}
 #: lengths of stretches and tables of w, by their indices in the header: numbers per row, and the number of rows as a
-#: sum of products of sizes (`?size`: 1, or 0 for a size of 0), of the method's requirements (`Room`) and of the number
-#: of columns
+#: sum of products of sizes (`?size`: 1, or 0 for a size of 0) and of the method's requirements (`Room`)
 LENGTHS: dict[int, tuple[int, str]] = {}
 #: NumPy types of rows of tables and layouts, by the class that declares them
 _ROWS: dict[type, np.dtype[Any]] = {}
@@ -154,55 +152,42 @@ class Room:
 # fmt: off
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
-    N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
-    MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS,
-    N_LOAD_NUMBERS, N_CHANGES, F_CHANGE, W_CHANGE,
+    N_CLOSURE_PAIRS, N_GROUPS, SCHUR_SIZE, JACOBIAN_SIZE, MOST_MODES, N_LAWS, N_LOADS,
+    N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS, N_LOAD_NUMBERS, N_CHANGES,
+    F_CHANGE, W_CHANGE,
 ) = _sizes("n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger "
-    "n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
-    "n_loads n_internal n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_load_numbers n_changes "
-    "f_change w_change",
+    "n_closure_pairs n_groups schur_size jacobian_size most_modes n_laws n_loads n_internal "
+    "n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_load_numbers n_changes f_change w_change",
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
-#: addresses of compiled functions, zero until the engine writes them (`compile.calls`). RATES: the function that steps
-#: evaluate, EVALUATE's or one that stores only what they read; CALLS: its list of calls, if any (`routines.emission`)
-EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RESOLVE, RATES, CALLS = ADDRESSES = _indices(8)
+#: addresses of functions, zero until the engine writes them (`compile.calls`). EVALUATE: stores all that the record has
+#: (`mechanics.record`), by the list RECORD_CALLS; RATES: what steps evaluate, that or one which stores only what they
+#: read; CALLS: its list, if any; RUN: runs those of `mechanics.responses`
+EVALUATE, PROJECT, PRESCRIBE, RESOLVE, RATES, CALLS, RECORD_CALLS, *_ = ADDRESSES = _indices(11)
+RUN, CLOSE, MOVE, SPRINGS = ADDRESSES[7:]
 
 # Topology in h -------------------------------------------------------------------------------------------------------
-#: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
-#: component: independent mechanism that it belongs to, -1 for the ground; leaf: 1 when it carries no other link; first:
-#: 1 when no other child of its parent has a larger number
-LINKS = topology("parent joint q0 c0 n_speeds flex inboard_port carried_by component leaf first")
+#: inboard_port: port of a flexible link's inboard frame or -1; component: independent mechanism that it belongs to, -1
+#: for the ground
+LINKS = topology("parent joint q0 c0 n_speeds flex inboard_port component")
 SITES = topology("link port")  # port: or -1
 #: data0: first of its numbers; inboard: 1 when modes move the inboard frame; coupled: 1 when modes have common entries
 #: of the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis:
-#: entries of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that
-#: basis; book: index in the ledger of its damping loss
-FLEXES = topology(
-    "link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0 book"
-)
-BASIS = topology("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
+#: entries of the basis; interface0: first of its numbers in that basis; book: index in the ledger of its damping loss
+FLEXES = topology("link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis interface0 book")
+BASIS = topology("mode shape")  # entries of the interface basis, shape after shape (`model.interface_basis`)
 MOMENTS = topology("mode")  # mode i of MOMENT_VALUES, row after row
 MOMENT_ROWS = topology("end")  # per body and row (3k + l) n + j of these: index in MOMENTS after its last one
-PORTS = topology("flex column shapes")  # column, shapes: the first ones, of moving shapes
-#: rows of the modal blocks that the elimination factors; rows of joint coordinates hold 1/sqrt(D). first: column;
-#: origin: index of column 0, which may lie before that of the first
-ENVELOPE = topology("first origin")
-#: threes: groups of three solved rows, adjacent in JACOBIAN and SPREAD and evaluated together; the last group may end
-#: with zeros.  coupling: index of its coupling, or -1; path0, n_path: of its links in PATHS
-CLOSURES = topology(
-    "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling path0 n_path"
-)
+PORTS = topology("flex shapes")  # shapes: the first one's numbers, of moving shapes
+#: jacobian0: of its entries in JACOBIAN, row after row; coupling: index of its coupling, or -1
+CLOSURES = topology("site_a site_b row0 n_rows support0 n_support jacobian0 kept0 n_kept coupling")
 CLOSURE_ROWS = topology("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = topology("coordinate")  # coordinates on which a closure depends
-ENTRIES = topology("slot column sign part")  # slot: in the support; part: of a coupling, 1 for its first joint
-KNOWN_ENTRIES = topology("closure drive column sign part")
-#: links between the ground and a closure's ends, leaves first; slot, shapes, carrier: slots of the first coordinate of
-#: the link's joint, of its first moving shape, and of its parent's, or -1
-PATHS = topology("link slot shapes carrier")
-CLOSURE_PAIRS = topology("a b common0 n_common")  # b >= a
-COMMON = topology("a b")  # slots of a common coordinate
-CLOSURE_ENVELOPE = topology("first origin")  # of the solved rows
+CLOSURE_PAIRS = topology("a b")  # with common coordinates; b >= a
+#: rows of the factor of J M^-1 J^T, of which SCHUR has the reciprocals on the diagonal. first: column; origin: index of
+#: column 0, which may lie before that of the first
+CLOSURE_ENVELOPE = topology("first origin")
 #: outer, inner: sites; friction: its law or -1; bristle: index of the bristles' deflection in the state or -1
 CONTACTS = topology("outer inner normal friction surfaces bristle")  # surfaces: their kind; the gauge of a stop
 LAWS = topology("piece0 n_pieces")  # the drives' laws first
@@ -231,7 +216,7 @@ LINK_NUMBERS = numbers("mass com:3 inertia:6 borne reaching")
 SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
 FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3 untilted:6")  # untilted: of sections that only twist
 FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness, damping (n); stiffening 3 (n n)
-MOMENT_VALUES = numbers("position rate")  # F + L and F of `bodies.flexible`
+MOMENT_VALUES = numbers("position rate")  # F + L and F of `mechanics.flexible`
 BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
@@ -260,37 +245,13 @@ BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), nu
 _FRAME = "origin:3 axes:3x3 omega:3 velocity:3 alpha:3 acceleration:3"
 FRAME = layout(_FRAME)
 X, U, DU = _stretches("x:nq+n_drives u:nv+n_drives du:nv+n_drives")
-#: as X and U, but for coordinates: those of moving shapes
-INTERFACE_X, INTERFACE_U = _stretches("interface_x:nv interface_u:nv")
 LINK_FRAMES, SITE_FRAMES = work(_FRAME, "n_links"), work(_FRAME, "n_sites")
-#: the motion subspace S of one joint: a twist per freedom, axes of its first frame
-SUBSPACE = work("angular:3 linear:3", "6")
-#: spatial inertia of links: mass, mass * centre, inertia (xx yy zz xy xz yz), about the link's origin
-OWN = work("mass moment:3 inertia:6", "n_links")
 WRENCH = work("moment:3 force:3", "n_links")
-COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3", count) for count in ("columns", "nv", "nv"))
-#: of each link, about its origin; arm: from the parent's origin: articulated inertia, which maps twists to wrenches by
-#: (turning mixed; mixed^T moving); a wrench; an acceleration; the wrench that its own accelerations need
-#: (`equations.articulated`)
-ARTICULATED = work(
-    "turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 own_moment:3 own_force:3", "n_links"
-)
-#: of three closure rows together: wrenches that a link transmits to its parent, a column each
-TRANSMITTED = work("moments:3x3 forces:3x3", "n_links")
-#: each column about its link's origin, and the gain K of the factor for each coordinate
-LOCAL, GAIN = work("angular:3 linear:3", "columns"), work("moment:3 force:3", "nv")
-#: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
-MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _stretches(
-    "modal_bias:nv modal:25*most_modes scratch:27 mass:mass_size force:nv residual:n_closure_rows "
-    "residual_rate:n_closure_rows gamma:n_closure_rows"
-)
-#: wrenches of the closure rows; then those of the couplings on their first joints
-ROWS = work("moment:3 force:3", "n_closure_rows+n_couplings")
+RESIDUAL, RESIDUAL_RATE = _stretches("residual:n_closure_rows residual_rate:n_closure_rows")
 #: ROW_SCALE: per selected row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after room for
 #: all rows, that of the last evaluation, which may be a trial far away
-JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _stretches(
-    "jacobian:jacobian_size spread:jacobian_size schur:schur_size row_scale:2*n_closure_rows pivot "
-    "multiplier:n_closure_rows"
+JACOBIAN, SCHUR, ROW_SCALE, PIVOT = _stretches(
+    "jacobian:jacobian_size schur:schur_size row_scale:2*n_closure_rows pivot"
 )
 #: per selected row its independence of those before it, at the end of the step, at its start, and the largest value so
 #: far; rows of the state's length: the Chebyshev series that passes a singular pose
@@ -313,9 +274,8 @@ LAW = work("value rate second_rate", "n_laws")
 LOAD = work("force:3 moment:3 value rate stored power loss", "n_loads")
 #: of loads with kinks: speeds along their coordinates, arguments of max, min and abs
 LOAD_BENDS = work("now", "n_load_bends")
-INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE = _stretches(
-    "internal:n_internal drive_force:n_drives ledger_rate:n_ledger position_rate:nq+n_drives y:ny y_new:ny y_stage:ny "
-    "slopes:slopes*ny dense:dense*ny"
+DRIVE_FORCE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE = _stretches(
+    "drive_force:n_drives y:ny y_new:ny y_stage:ny slopes:slopes*ny dense:dense*ny"
 )
 #: memory of a method between steps (`Room`), up to QUADRATURES
 MEMORY, VECTORS, MATRICES = _stretches("memory:floats vectors:vectors*ny matrices:matrices*ny*ny")
@@ -329,7 +289,7 @@ AXES, COUPLING, READING, LIFTING, RESPONSE = _stretches(
 #: (z, z') of each oscillator; its phi functions in each quadrature, and the contributions of four sources to (z, z') by
 #: them, weights of 1 and Lambda each (`integrate.exponential`)
 OSCILLATIONS, QUADRATURES = work("z rate", "oscillations*nv"), work("phi:10 share:8", "quadratures*nv")
-MAGNITUDE, CORRECTION, LATCHED = _stretches("magnitude:n_groups correction:nv latched:n_contacts")
+MAGNITUDE, LATCHED = _stretches("magnitude:n_groups latched:n_contacts")
 #: watched values of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force; slip_rate:
 #: rate of the sliding speed, 0 where unknown; event_row: of its last closing; mode0, latched0: mode and impact rate
 #: that hold within the step

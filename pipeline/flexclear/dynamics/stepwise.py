@@ -26,7 +26,6 @@ from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine, another
 from flexclear.dynamics.run.evaluation.observation import observe_with, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.evaluation.tree_factor import bias
 from flexclear.dynamics.run.inputs import Inputs
 from flexclear.dynamics.run.pieces import digest, memory, remember
 from flexclear.dynamics.run.progress_rate import Judge, Look, crawls
@@ -240,6 +239,8 @@ class Simulation:
 
     def equations(self) -> Equations:
         """Return mass matrix, bias forces and Jacobian of the loop closures in the present state."""
+        from flexclear.dynamics.run.evaluation.matrices import holding_forces
+
         engine, watch = self._here(), self._watch
         watch.keep(engine.selected)
         watch.modes[:], watch.latched[:] = engine.modes[: len(watch.modes)], engine.latched
@@ -248,7 +249,7 @@ class Simulation:
         closure_rows.evaluate(watch, engine.view(m.Y), self.time)
         mass, closures = inertia(watch)
         names, signs = _coordinates(watch.model)
-        forces = signs * (modes_of(watch.model.arrays) @ bias(watch))
+        forces = signs * (modes_of(watch.model.arrays) @ holding_forces(watch)[0])
         speeds = signs * engine.view(m.Y)[watch.model.speeds]
         return Equations(names, speeds, signs[:, None] * mass * signs, forces, closures * signs)
 

@@ -36,8 +36,7 @@ class Traits:
     estimates: it estimates its error, which controls its steps; otherwise a scene must give the step.
     dissipative: it damps by its order, so that energy is lost long before a run is wrong.
     long_steps: they span many vibrations, whose work on the drives is known less exactly than the motion.
-    retracts: it needs positions after a displacement (`dynamics.equations.retraction`).
-    reads_all: it reads more of some evaluations than the rates, and receives a second function for these.
+    retracts: it needs positions after a displacement.
     hands_over_to: implicit method that continues where stability limits the steps that it chooses, and that messages
         recommend where steps are given; empty for methods that are stable themselves.
     tolerances, steps: those at which `flexclear cost` runs it; steps in s.
@@ -50,7 +49,6 @@ class Traits:
     dissipative: bool = False
     long_steps: bool = False
     retracts: bool = False
-    reads_all: bool = False
     hands_over_to: str = ""
     tolerances: tuple[float, ...] = ()
     steps: tuple[float, ...] = ()
@@ -67,8 +65,6 @@ INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
             "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, steps=STEPS
         ),
         "radau": Traits("radau", 5, implicit=True, tolerances=TO_1E_9),
-        "exponential": Traits(
-            "exponential", 6, implicit=True, long_steps=True, retracts=True, reads_all=True, tolerances=TO_1E_9
-        ),
+        "exponential": Traits("exponential", 6, implicit=True, long_steps=True, tolerances=TO_1E_9),
     }
 )

@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 
 import flexclear.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile.files import SIGNATURES, compiles, interpreted
+from flexclear.dynamics.compile.files import PART, SIGNATURES, compiles, interpreted
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import INTERPRETED, PLAIN, kernel
 
@@ -66,7 +66,7 @@ if INTERPRETED:  # for debugging: the same calls between functions of Python, wh
 
 @kernel
 def evaluate(h, f, w, n, t, y, dy):
-    """Evaluate the right-hand side: `equations.right_hand_side`."""
+    """Evaluate the right-hand side, and store all that the record has of it: `mechanics.record`."""
     call(h[m.EVALUATE], (h, f, w, n, float(t), y, dy))
 
 
@@ -74,12 +74,6 @@ def evaluate(h, f, w, n, t, y, dy):
 def laws(h, f, w, n, t):
     """Evaluate the laws of time: `equations.prescribed_motion`."""
     call(h[m.PRESCRIBE], (h, f, w, n, float(t)))
-
-
-@kernel
-def describe(h, f, w, n):
-    """Evaluate the recorded quantities: `equations.observation`."""
-    call(h[m.DESCRIBE], (h, f, w, n))
 
 
 @kernel
@@ -102,9 +96,30 @@ def project(h, f, w, n, t, y, dy, tolerance):
 
 
 @kernel
-def retract(d, y, retractment, out, total):
-    """Store the positions after a retractment: `equations.retraction`."""
-    call(d.h[m.RETRACT], (d.h, d.f, d.w, d.n, y, retractment, out, total))
+def correct(h, f, w, n, t, y, dy):
+    """Store, as rates of the state evaluated last, the changes that close its loops: `mechanics.responses`."""
+    call(h[m.RUN], (h, f, w, n, float(t), y, dy, h[m.CLOSE]))
+
+
+@kernel
+def retract(d, y, displacement, out):
+    """Store the positions after a displacement; all are indices in w."""
+    for k in range(d.nq):
+        d.w[out + k] = d.w[y + k]
+    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, d.time, out, displacement - d.nq, d.h[m.MOVE]))
+
+
+@kernel
+def factor_springs(d, t, y):
+    """Prepare `release_spring` for a state."""
+    laws(d.h, d.f, d.w, d.n, t)
+    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, float(t), y, y, d.h[m.SPRINGS]))
+
+
+@kernel
+def release_spring(d, t, y, response):
+    """Replace forces on modes, in a row like the state's rates, by what they cause."""
+    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, float(t), y, response, d.h[m.SPRINGS] + PART))
 
 
 @kernel

@@ -29,16 +29,15 @@ loaded: dict[str, machine_code.Code] = {}
 #: Python functions by their numbers, where nothing is compiled
 interpreted: dict[int, Callable] = {}
 CODE = ".code"  #: suffix of the compiled code of a file
+PART = 32  #: bytes from a part of a list to the next
 #: arguments of compiled functions, which return an integer: pointers to integers (I) and floats (F), an integer (i), a
-#: float (f).  After h, f, w, n: t, y, dy, and a tolerance; y, retractment, out, total; t; nothing; rows and pieces with
-#: their shapes, tolerance, out with its length; t, repeat, outputs with their number, rows, events; step, t_new, rows,
-#: events.  Of several lanes: table, places, numbers
+#: float (f).  After h, f, w, n: t, y, dy, and a tolerance; t; rows and pieces with their shapes, tolerance, out with
+#: its length; t, repeat, outputs with their number, rows, events; step, t_new, rows, events.  Of several lanes: table,
+#: places, numbers
 SIGNATURES = {
     "evaluate": "IFFI fii",
     "project": "IFFI fiif",
-    "retract": "IFFI iiii",
     "prescribe": "IFFI f",
-    "describe": "IFFI",
     "observe": "IFFI Fii Iii fFi",
     "advance": "IFFI fi Fi Fii Fii",
     "resolve": "IFFI ff Fii Fii",

@@ -27,24 +27,18 @@ from flexclear.dynamics.compile import machine_code, sources
 from flexclear.dynamics.compile.compiler_process import second_process
 from flexclear.dynamics.compile.files import CODE, SIGNATURES, compiled, interpreted, load_files, loaded
 from flexclear.dynamics.compile.folder import prune, writable
-from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.effects import Parts, Scheme
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.workflow.fingerprint import TREE, library_version, sources_of
 
 #: of each function: description for progress, and the header's index of its address if others call it (specialised code
-#: has one per selection of closure rows). This process compiles in this order, the second one in the opposite order;
-#: the generic kernels that replace specialised code have most code in common, which each process compiles once
+#: has one per selection of closure rows). This process compiles in this order, the second one in the opposite order
 FUNCTIONS: dict[str, tuple[str, int | None]] = {
     "advance": ("integrator", None),
     "prescribe": ("laws of time", m.PRESCRIBE),
     "project": ("projection onto loop closures", m.PROJECT),
-    "retract": ("retraction of positions", m.RETRACT),
     "observe": ("outputs", None),
-    "evaluate": ("equations of motion", m.EVALUATE),
-    "describe": ("outputs", m.DESCRIBE),
-    DESCRIBED: ("specialised outputs", None),
-    WHOLE: ("specialised equations of motion", None),
     SPECIALISED: ("specialised equations of motion", None),
     "resolve": ("location of events", m.RESOLVE),
 }
@@ -89,16 +83,12 @@ def entry(
 ) -> Entry:
     """Return the compiled functions for these parts; `report` receives a message for each function to compile.
 
-    equations: sources by name of specialised code, or of generic kernels, which are compiled where the former has none.
+    equations: sources by name of specialised code.
     """
     folder, began = writable(kernel_root(), report), time.monotonic()
     texts = {**sources.sources(parts, scheme), **equations}
     files = {name: _file(folder, name, source) for name, source in texts.items()}
     _load(folder, files, report, began)
-    if not all(loaded[files[name].stem].address for name in (WHOLE, DESCRIBED) if name in files):
-        kernels = {name: _file(folder, name, source) for name, source in sources.kernels(parts).items()}
-        _load(folder, kernels, report, began)
-        files |= kernels
     return Entry({name: loaded[path.stem].address for name, path in files.items()})
 
 

@@ -1,45 +1,29 @@
-"""Sources of the compiled functions of a mechanism, a file each, composed of lists of parts.
+"""Sources of the compiled functions of a mechanism, a file each.
 
-A file composes exactly the kernels of the kinds present: kernels that a scene does not use are neither imported nor
-compiled. A file depends on no more than it needs, so that mechanisms share files: steps depend on the integrator and on
-the presence of closures and contacts, not on joints or bodies.
-
-Effects declare what they add to a file (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
-right-hand side) and "observe" (recorded quantities).
+A file composes exactly the kernels that a scene uses: others are neither imported nor compiled. It depends on no more
+than it needs, so that mechanisms share files: steps depend on the integrator and on the presence of closures and
+contacts, not on joints or bodies.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from flexclear.dynamics.compile import formulas
 from flexclear.dynamics.effects import Parts, Scheme
-from flexclear.dynamics.effects.effect import Effect
-from flexclear.scene import integrators
 
 if TYPE_CHECKING:
     from flexclear.dynamics.specialise.topology import Topology
 
 DYNAMICS = "flexclear.dynamics"
 INTEGRATE = f"{DYNAMICS}.integrate"
-#: packages with the tables of parts
-FAMILIES = {
-    "JOINTS": f"{DYNAMICS}.joints",
-    "SURFACES": f"{DYNAMICS}.contact.surfaces",
-    "FORMS": f"{DYNAMICS}.contact.form",
-    "FRICTION_LAWS": f"{DYNAMICS}.contact.friction",
-    "LOADS": f"{DYNAMICS}.loads",
-    "METHODS": INTEGRATE,
-}
 #: modules of calls by address, and of functions assembled from LLVM code
 CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
-#: specialised code: right-hand side as steps call it, right-hand side with all its side results, recorded quantities
-SPECIALISED, WHOLE, DESCRIBED = "specialised", "whole", "described"
+#: right-hand side of one topology, as steps call it
+SPECIALISED = "specialised"
 PROGRAM, BATCHED = f"{DYNAMICS}.specialise.program", (f"{DYNAMICS}.specialise", "batched")
-PRESCRIBED, RIGHT_HAND_SIDE = f"{DYNAMICS}.equations.prescribed_motion", f"{DYNAMICS}.equations.right_hand_side"
+PRESCRIBED = f"{DYNAMICS}.equations.prescribed_motion"
 
 
 @dataclass
@@ -64,33 +48,10 @@ class Composition:
         self.imports.append((module, name))
         return name
 
-    def part(self, table: str, name: str) -> str:
-        """Return the expression for a part that a table of `FAMILIES` lists."""
-        return f'{self.take(FAMILIES[table], table)}["{name}"]'
-
-    def family(self, table: str, names: Iterable[str]) -> str:
-        """Return the expression for a tuple of parts that a table lists."""
-        return "(" + "".join(f"{self.part(table, name)}, " for name in names) + ")"
-
-    @property
-    def tree(self) -> str:
-        """Name of the module that eliminates along the tree."""
-        return self.take(f"{DYNAMICS}.equations", "articulated")
-
-    @property
-    def forms(self) -> str:
-        """Expression for the forms of normal forces."""
-        return self.family("FORMS", self.parts.forms)
-
     @property
     def harmonics(self) -> str:
         """Name of the kernel of harmonic laws; empty without harmonics."""
         return self.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if self.parts.harmonics else ""
-
-    @property
-    def flexible(self) -> str:
-        """Expression for the kernels of the flexible bodies, unless an effect replaces them."""
-        return f"{self.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
 
     @property
     def projection(self) -> str:
@@ -99,62 +60,27 @@ class Composition:
             "calls.project" if self.parts.closures else self.take(f"{DYNAMICS}.equations.projection", "no_projection")
         )
 
-    def add_effects(self, point: str) -> None:
-        """Add the arguments that the present effects declare for a point."""
-        for effect in self.parts.present:
-            self.given |= {name: self._of(effect, text) for name, text in effect.compose.get(point, {}).items()}
-
-    def _of(self, effect: Effect, text: str) -> str:
-        """Return the expression of an argument that an effect declares, after importing its names."""
-        kinds = self.parts.kinds(effect.name)
-        text = re.sub(r"<([\w.]+)\.(\w+)>", lambda m: self.take(f"{DYNAMICS}.{m[1]}", m[2]), text)
-        chosen = self.family(effect.family, kinds) if kinds and "{kinds}" in text else ""
-        return text.format(file=self, kinds=chosen)
-
-    def add_closures(self) -> None:
-        """Add the kernels of the closures: those of joints, unless an effect replaces them."""
-        self.add_effects("closures")
-        if "closures" not in self.given:
-            self.given["closures"] = f"{self.take(f'{DYNAMICS}.equations.closures', 'make_closing')}({self.tree})"
-
-    def text(self, function: str, formulas: str = "", using: tuple[str, str] = CALLS) -> str:
-        """Return the source; function: code to compile; formulas: expressions' kernels; using: import of `function`."""
+    def text(self, function: str) -> str:
+        """Return the source; function: code to compile, which calls others by address; empty for none."""
         maker = self.take(*self.maker)
         lines = sorted(
-            {f"from {module} import {name}" for module, name in [*([using] if function else []), *self.imports]}
+            {f"from {module} import {name}" for module, name in [*([CALLS] if function else []), *self.imports]}
         )
         arguments = [f"    {key}={value}," for key, value in self.given.items()]
         made = [f"{self.kernel} = {maker}(", *arguments, ")", "", "", function]
-        return "\n".join([f'"""Generated: {self.what}."""', *lines, "", formulas, *made])
-
-    def calling(self, name: str, arguments: str = "", formulas: str = "") -> str:
-        """Return the source of a function that others call by its address, for a kernel that returns nothing."""
-        given = ", ".join(["h, f, w, n", *([arguments] if arguments else [])])
-        function = f'@calls.exported("{name}")\ndef {name}({given}):\n    {self.kernel}({given})\n    return 0\n'
-        return self.text(function, formulas)
+        return "\n".join([f'"""Generated: {self.what}."""', *lines, "", *made])
 
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
-    """Return the sources by function name, without the right-hand side, in an order where callees come first."""
-    by_name = {"prescribe": _laws(parts).calling("prescribe", "t")}
+    """Return the sources by function name, without those of one topology, in an order where callees come first."""
+    by_name = {"prescribe": _laws(parts).text(PRESCRIBE)}
     if parts.closures:
         by_name["project"] = _projection(parts).text(PROJECT)
-    if integrators.INTEGRATORS[scheme.integrator].retracts:
-        maker = (f"{DYNAMICS}.equations.retraction", "make_retraction")
-        retraction = _joints(parts, "retraction of", "retraction", maker)
-        by_name["retract"] = retraction.calling("retract", "y, displacement, out, total")
     events = _steps(parts, scheme, f"events in steps of {scheme}", "resolution", "make_resolution")
     if "events" in events.given:
         events.take(f"{DYNAMICS}.fields", "data")
         by_name["resolve"] = events.text(RESOLVE)
     return by_name | {"observe": _observation(parts).text(OBSERVE), "advance": _advance(parts, scheme)}
-
-
-def kernels(parts: Parts) -> dict[str, str]:
-    """Return the sources of generic right-hand side and recorded quantities, for a topology without own code."""
-    formulas = _formulas(parts)
-    described = _description(parts).calling("describe", formulas=formulas)
-    return {"evaluate": _right_hand_side(parts).calling("evaluate", "t, y, dy", formulas), "describe": described}
 
 
 def _laws(parts: Parts) -> Composition:
@@ -165,31 +91,12 @@ def _laws(parts: Parts) -> Composition:
     return file
 
 
-def _right_hand_side(parts: Parts) -> Composition:
-    """Return a file for the generic right-hand side, with the laws of time."""
-    file = _equations(parts)
-    file.kernel, file.maker = "right_hand_side", (RIGHT_HAND_SIDE, "make_right_hand_side")
-    file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({file.harmonics})"
-    return file
-
-
-def specialised(parts: Parts, topology: Topology, name: str = SPECIALISED, *, exact: bool = False) -> str:
-    """Return the source of specialised code for one topology.
-
-    name: of the right-hand side as steps call it, of that with all its side results, or of the recorded quantities.
-    exact: True for the same bits as in each of several lanes.
-    """
-    if name == SPECIALISED:
-        longest = "LONGEST" if exact else "LONGEST_STRAIGHT"
-        used = [FILES, (PROGRAM, "llvm_text"), (PROGRAM, "NAME")]
-        return _of_topology(parts, topology, STRAIGHT, used, longest, exact=exact)
-    file = _description(parts) if name == DESCRIBED else _equations(parts)
-    for taken in ("llvm_text", "program", "NAME"):
-        file.take(PROGRAM, taken)
-    file.what += ", for one topology"
-    options = ", describes=True" if name == DESCRIBED else ""
-    function = ONE_TOPOLOGY.format(topology=_rows(topology), kernel=file.kernel, options=options)
-    return file.text(function, _formulas(parts), FILES)
+def specialised(parts: Parts, topology: Topology, *, exact: bool = False) -> str:
+    """Return the source of steps' right-hand side of one topology; exact: with the same bits as in each of several
+    lanes."""
+    longest = "LONGEST" if exact else "LONGEST_STRAIGHT"
+    used = [FILES, (PROGRAM, "llvm_text"), (PROGRAM, "NAME")]
+    return _of_topology(parts, topology, STRAIGHT, used, longest, exact=exact)
 
 
 def batched(parts: Parts, topology: Topology, lanes: int) -> str:
@@ -215,73 +122,34 @@ def _of_topology(
     **values: object,
 ) -> str:
     """Return the source of code for steps; taken: modules and names that it imports; longest: name of its limit."""
-    values["topology"], taken = _rows(topology), [*taken, (PROGRAM, longest)]
-    taken += [("flexclear.dynamics.effects", "Parts"), (f"{DYNAMICS}.mechanics.of_topology", "program_of")]
-    imports = "".join(f"from {module} import {name}\n" for module, name in sorted(taken))
+    values["topology"] = "".join(f"    {row},\n" for row in topology)
+    used = (PROGRAM, longest), (f"{DYNAMICS}.effects", "Parts"), (f"{DYNAMICS}.mechanics.of_topology", "program_of")
+    imports = "".join(f"from {module} import {name}\n" for module, name in sorted([*taken, *used]))
     made = template.format(made=f"program_of(PARTS, TOPOLOGY, {longest})", **values)
     return f'"""Generated: right-hand side for one topology."""\n{imports}\nPARTS = {parts}\n{made}'
 
 
-def _rows(topology: Topology) -> str:
-    return "".join(f"    {row},\n" for row in topology)
-
-
-def rates(parts: Parts) -> str:
-    """Return the source of the kernel `rates` for Python (`specialise.dual`), without friction of ideal joints."""
-    return _equations(parts, whole=False).text("", _formulas(parts))
-
-
 def for_python(parts: Parts) -> Iterator[tuple[str, str, str]]:
-    """Yield name, kernel and source of all with which Python evaluates and observes a state, without compilation.
+    """Yield name, kernel and source of all kernels with which Python observes a state, without compilation.
 
     They call those before them as the names of `calls`.
     """
-    formulas = _formulas(parts)
-    files = {"laws": _laws(parts), "evaluate": _right_hand_side(parts), "describe": _description(parts)}
-    files |= {"project": _projection(parts)} if parts.closures else {}
+    files = {"laws": _laws(parts)} | ({"project": _projection(parts)} if parts.closures else {})
     for name, file in (files | {"observe": _observation(parts)}).items():
-        yield name, file.kernel, file.text("", formulas if name in ("evaluate", "describe") else "")
-
-
-def _equations(parts: Parts, *, whole: bool = True) -> Composition:
-    """Return a file for the right-hand side; whole: with friction of ideal joints."""
-    file = _forces(parts, "right-hand side of", "rates", (RIGHT_HAND_SIDE, "make_rates"))
-    file.given["tree"] = file.tree
-    if parts.closures:
-        file.add_closures()
-    if whole:
-        file.add_effects("evaluate")
-    return file
+        yield name, file.kernel, file.text("")
 
 
 def _projection(parts: Parts) -> Composition:
     """Return a file for the projection onto the closures."""
-    projection = f"{DYNAMICS}.equations.projection"
-    file = _joints(parts, "projection with", "projection", (projection, "make_projection"))
-    file.given["evaluate"] = "calls.evaluate"
-    file.add_closures()
-    if parts.flexible:
-        stiffen = file.take(projection, "make_stiffen")
-        file.given["stiffen"] = f"{stiffen}({file.given['closures']}, {file.tree}, {file.flexible})"
-        file.given["to_modes"] = file.take(f"{DYNAMICS}.bodies.interface", "to_modes")
-    return file
-
-
-def _description(parts: Parts) -> Composition:
-    """Return a file for the recorded quantities of an evaluation."""
-    maker = (f"{DYNAMICS}.equations.observation", "make_description")
-    file = _forces(parts, "what is recorded of", "description", maker)
-    file.add_effects("observe")
-    if parts.closures:
-        file.add_effects("observe closures")
+    file = Composition(parts, "projection", "projection", (f"{DYNAMICS}.equations.projection", "make_projection"))
+    file.given = {"rates": "calls.rates", "correct": "calls.correct"}
     return file
 
 
 def _observation(parts: Parts) -> Composition:
     """Return a file for the record of states."""
     file = Composition(parts, "record", "observation", (f"{DYNAMICS}.equations.observation", "make_observation"))
-    file.given = {"evaluate": "calls.evaluate", "laws": "calls.laws", "describe": "calls.describe"}
-    file.given["project"] = file.projection
+    file.given = {"evaluate": "calls.evaluate", "project": file.projection}
     return file
 
 
@@ -300,11 +168,9 @@ def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> 
     file.given = {
         "evaluate": "calls.rates",
         "project": file.projection,
-        "retract": "calls.retract",
-        "method": file.part("METHODS", scheme.integrator),
+        "lists": "calls",
+        "method": f'{file.take(INTEGRATE, "METHODS")}["{scheme.integrator}"]',
     }
-    if integrators.INTEGRATORS[scheme.integrator].reads_all:
-        file.given["complete"] = f"(calls.evaluate, {file.tree})"
     events = _events(file, scheme)
     if events:
         file.given["events"] = events
@@ -329,53 +195,7 @@ def _events(file: Composition, scheme: Scheme) -> str:
     return file.take(f"{INTEGRATE}.guards", "GUARDS") if guarded else ""
 
 
-def _joints(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
-    """Return a file that depends on the joints."""
-    file = Composition(parts, f"{what} {', '.join(parts.joints)}", kernel, maker)
-    file.given["joints"] = file.family("JOINTS", parts.joints)
-    return file
-
-
-def _forces(parts: Parts, what: str, kernel: str, maker: tuple[str, str]) -> Composition:
-    """Return a file with the forces of a mechanism: joints, flexible bodies, contacts, loads."""
-    file = _joints(parts, what, kernel, maker)
-    if parts.flexible:
-        file.given["flexible"] = file.flexible
-    if parts.surfaces:
-        surfaces, frictions = file.family("SURFACES", parts.surfaces), file.family("FRICTION_LAWS", parts.frictions)
-        contacts = file.take(f"{DYNAMICS}.contact.forces", "make_contacts")
-        file.given["contacts"] = f"{contacts}(surfaces={surfaces}, forms={file.forms}, frictions={frictions})"
-    if parts.loads:
-        kinds = "".join(f"{_load(file, n, *kind.split(maxsplit=1))}, " for n, kind in enumerate(parts.loads))
-        file.given["loads"] = f"{file.take(f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
-    file.add_effects("forces")
-    return file
-
-
-def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
-    """Return the expression for the kernel of a kind of loads, which may call that of an expression (`_formulas`)."""
-    module = file.part("LOADS", name)
-    if not formula:
-        return f"{module}.apply"
-    file.take(f"{DYNAMICS}.kernels", "kernel")
-    file.take(FAMILIES["LOADS"], "looks")
-    return f"{module}.applying(formula{number})"
-
-
-def _formulas(parts: Parts) -> str:
-    """Return the kernels of the expressions of loads."""
-    written = [(n, kind.split(maxsplit=1)) for n, kind in enumerate(parts.loads)]
-    texts = [(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1]
-    if not texts:
-        return ""
-    return "\n\n".join(formulas.source(*text) for text in texts)
-
-
 # laws of time are not specialised: their pieces change with time, and their number with the scene's numbers
-ONE_TOPOLOGY = """TOPOLOGY = (
-{topology})
-files.assembles(__name__, NAME, lambda: llvm_text(program({kernel}, TOPOLOGY{options}){options}), 0)
-"""
 STRAIGHT = """TOPOLOGY = (
 {topology})
 files.assembles(__name__, NAME, lambda: llvm_text({made}, exact={exact}), 3)
@@ -403,6 +223,11 @@ run = make_lanes(*batched.batched(lambda: {made}, {lanes}), {lanes})
 @calls.exported("lanes")
 def lanes(table, places, numbers):
     run(table, places, numbers)
+    return 0
+"""
+PRESCRIBE = """@calls.exported("prescribe")
+def prescribe(h, f, w, n, t):
+    laws(h, f, w, n, t)
     return 0
 """
 PROJECT = """@calls.exported("project")

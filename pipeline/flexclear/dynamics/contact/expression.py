@@ -1,7 +1,8 @@
-"""Expressions of contact laws as kernels, composed of one kernel per operation (`scene.law_expressions`)."""
+"""Expressions of contact laws as functions of numbers that may be symbols (`scene.law_expressions`)."""
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable
 from functools import lru_cache, partial
 from typing import Any
@@ -9,29 +10,14 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics.contact.restitution import root
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import cos, exp, larger, log, sin, smaller, sqrt, tan, tanh
 from flexclear.scene.expression import BENT, OPERANDS, fold
 from flexclear.scene.formulas import WHOLE
 
-VARIABLES = (kernel(lambda a, b, c, p: a), kernel(lambda a, b, c, p: b), kernel(lambda a, b, c, p: c))
-OPERATIONS: dict[str, Callable] = {
-    "+": kernel(lambda x, y: x + y),
-    "-": kernel(lambda x, y: x - y),
-    "*": kernel(lambda x, y: x * y),
-    "/": kernel(lambda x, y: x / y),
-    "^": kernel(lambda x, y: x**y),
-    "max": kernel(lambda x, y: max(x, y)),
-    "min": kernel(lambda x, y: min(x, y)),
-    "minus": kernel(lambda x: -x),
-    "abs": kernel(lambda x: abs(x)),
-    "norm": kernel(lambda x: abs(x)),
-    "sqrt": kernel(lambda x: np.sqrt(x)),
-    "sin": kernel(lambda x: np.sin(x)),
-    "cos": kernel(lambda x: np.cos(x)),
-    "tan": kernel(lambda x: np.tan(x)),
-    "exp": kernel(lambda x: np.exp(x)),
-    "log": kernel(lambda x: np.log(x)),
-    "tanh": kernel(lambda x: np.tanh(x)),
+OPERATIONS: dict[str, Callable[..., Any]] = {
+    **{"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "^": operator.pow},
+    **{"max": larger, "min": smaller, "minus": operator.neg, "abs": abs, "norm": abs},
+    **{"sqrt": sqrt, "sin": sin, "cos": cos, "exp": exp, "log": log, "tan": tan, "tanh": tanh},
 }
 
 
@@ -49,17 +35,17 @@ class Laws(dict[str, Any]):
 
 
 def composed(kind: str, bends: list[Callable] | None = None) -> Callable:
-    """Return the kernel (a, b, c, values) of an expression of up to three variables.
+    """Return the function (a, b, c, values) of an expression of up to three variables.
 
-    bends: receives the kernels of values at whose zeros its slope jumps.
+    bends: receives functions of values at whose zeros its slope jumps.
     """
 
     def apply(token: str, given: list[Callable]) -> Callable:
         if bends is not None and token in BENT:
-            bends.append(_two(OPERATIONS["-"], *given) if len(given) == 2 else given[0])
+            bends.append(_applied(operator.sub, *given) if len(given) == 2 else given[0])
         if token[0] == "^" and token[1:]:
-            return _one(_power(float(token[1:])), *given)
-        return (_two if len(given) == 2 else _one)(OPERATIONS[token], *given)
+            return _applied(_power(float(token[1:])), *given)
+        return _applied(OPERATIONS[token], *given)
 
     return fold(kind.split(",")[1:], _leaf, apply, _operands)
 
@@ -68,52 +54,29 @@ def _operands(token: str) -> int:
     return 1 if token[0] == "^" and token[1:] else OPERANDS.get(token, 0)
 
 
-def _leaf(token: str) -> Callable:
+def _leaf(token: str) -> Callable[..., Any]:
+    index = int(token[1:]) if token[0] in "xc" else -1
     if token[0] == "x":
-        return VARIABLES[int(token[1:])]
-    index, value = (int(token[1:]), 0.0) if token[0] == "c" else (-1, float(token))
-
-    @kernel
-    def named(a, b, c, p):
-        return p[index]
-
-    @kernel
-    def number(a, b, c, p):
-        return value
-
-    return number if index < 0 else named
+        return lambda *given: given[index]
+    return (lambda a, b, c, p: p[index]) if index >= 0 else (lambda a, b, c, p: float(token))
 
 
-def _one(operation: Callable, first: Callable) -> Callable:
-    @kernel
-    def applied(a, b, c, p):
-        return operation(first(a, b, c, p))
-
-    return applied
+def _applied(operation: Callable[..., Any], *operands: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda *given: operation(*(operand(*given) for operand in operands))
 
 
-def _two(operation: Callable, first: Callable, second: Callable) -> Callable:
-    @kernel
-    def applied(a, b, c, p):
-        return operation(first(a, b, c, p), second(a, b, c, p))
-
-    return applied
-
-
-def _power(exponent: float) -> Callable:
-    """Return the kernel of a power, by products and a root where these suffice."""
-    whole, half, inverse = int(abs(exponent)), abs(exponent) % 1.0 == 0.5, exponent < 0.0
+def _power(exponent: float) -> Callable[[Any], Any]:
+    """Return the power, by products and a root where these suffice."""
+    whole, half = int(abs(exponent)), abs(exponent) % 1.0 == 0.5
     if not (whole <= WHOLE and 2.0 * exponent == int(2.0 * exponent)):
-        return kernel(lambda x: x**exponent)
+        return lambda x: x**exponent
 
-    @kernel
-    def power(x):
-        y = 1.0
+    def power(x: Any) -> Any:
+        y: Any = 1.0
         for _ in range(whole):
             y = y * x
-        if half:
-            y = y * np.sqrt(x)
-        return 1.0 / y if inverse else y
+        y = y * sqrt(x) if half else y
+        return 1.0 / y if exponent < 0.0 else y
 
     return power
 

@@ -1,4 +1,4 @@
-"""Declaration of an effect: what memory layout and generated files hold for it. It imports no code of the effect."""
+"""Declaration of an effect: what the memory layout holds for it. It imports no code of the effect."""
 
 from __future__ import annotations
 
@@ -16,13 +16,9 @@ class Effect:
 
     name: of its modules.
     kinds: for a scene with the effect the kinds by which its code is composed, often none; None for other scenes.
-    family: table of parts (`compile.sources.FAMILIES`) whose members these kinds are.
     topology, numbers: rows of its tables in h and f by table name (`memory`). A table in h adds a size ``n_<table>`` to
     the header, a ledger the size ``<name>_slot``.  work: likewise in w, each after the number of its rows.
     stretches: arrays in w, each with its length, as `memory` writes them.
-    compose: arguments that it adds to generated files, or replaces, by the point in `compile.sources` where it does so.
-    In their texts, ``<module.name>`` is a name in a module of `dynamics`, ``{file}`` the
-    `compile.sources.Composition`, and ``{kinds}`` the tuple of its kinds.
     changeable: keys of a scene, as ``table.key``, that change only numbers of the effect (`model.refill`).
     touches: True when it has contacts, which open and close at events.
     ledger, guards: whether it has a block of the ledger, and rows of the table GUARDS, on which steps end
@@ -31,12 +27,10 @@ class Effect:
 
     name: str
     kinds: Callable[[Scene], Iterable[str] | None]
-    family: str = ""
     topology: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, str] = field(default_factory=dict)
     work: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     stretches: tuple[str, ...] = ()
-    compose: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     changeable: tuple[str, ...] = ()
     touches: bool = False
     ledger: bool = False

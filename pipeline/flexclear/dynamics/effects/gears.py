@@ -9,8 +9,4 @@ GEARS = Effect(
     lambda scene: () if scene.gear else None,
     topology={"couplings": "first second"},  # gauges of two joint coordinates; the second follows the first
     numbers={"coupling_numbers": "ratio offset"},  # second coordinate = ratio * first + offset
-    compose={
-        "closures": {"closures": "<equations.gears.make_coupled_closing>({file.tree})"},
-        "observe": {"couplings": "<equations.gears.take_off_first_joints>"},
-    },
 )

@@ -30,15 +30,12 @@ def _laws(scene: Scene) -> list[str]:
 JOINT_FRICTION = Effect(
     "joint_friction",
     lambda scene: _laws(scene) or None,
-    "FRICTION_LAWS",
     topology={
         # site_a, site_b: of its frames; link: the link whose inboard joint it is, or -1; reversed: 1 when that link is
         # on the side of the first frame; closure: its closure, or -1
-        "rubbing": "site_a site_b link reversed closure entry0 n_entries loop0 n_loops  bearing0 n_bearings",
+        "rubbing": "site_a site_b link reversed closure bearing0 n_bearings",
         # bearings of these joints. kind: see `equations`; side, axis: of the frame; bristle: see CONTACTS
         "bearings": "joint kind law side axis bristle",
-        "rubbing_entries": "coordinate column sign",  # coordinates that move it; prescribed ones after the free ones
-        "reaction_loops": "closure sign part",  # closures that act beyond it
     },
     # radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per
     # force along the axis and per moment about it; preload: constant normal force
@@ -47,26 +44,11 @@ JOINT_FRICTION = Effect(
         # unit: wrench of its friction on the joint's second body per normal force, about the kernels' origin; loss:
         # lost power per normal force [m/s]
         "bearing": ("n_bearings", "load slip loss unit_moment:3 unit_force:3"),
-        # search for the loads: fraction of the friction, iterations, last change, flag for gradual increase
-        "search": ("1", "share turns change strides"),
         # quantities with kinks of the friction where they reverse: sliding velocity, normal forces of the force along
         # the axis and of the moment about it, forces at both ends
         "bends": ("n_bearings", "sliding:3 along about one_end:2 other_end:2"),
         # joint reactions: without friction, then per normal force of each bearing; about the second frame's origin
         "reactions": ("n_rubbing+n_rubbing*n_bearings", "moment:3 force:3"),
-    },
-    # slopes and residuals of the equations of the bearings' loads; multipliers of the closures without friction
-    stretches=(
-        "bearing_slopes:n_bearings*n_bearings",
-        "bearing_residuals:n_bearings",
-        "smooth_multiplier:n_closure_rows*?n_bearings",
-    ),
-    compose={
-        "evaluate": {
-            "friction": "(<equations.joint_friction.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
-            "<equations.joint_friction.load_drives>)"
-        },
-        "observe closures": {"friction": "<equations.joint_friction.take_off_closures>"},
     },
     ledger=True,
     guards=True,

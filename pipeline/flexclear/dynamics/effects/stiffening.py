@@ -9,5 +9,4 @@ STIFFENING = Effect(
     lambda scene: () if any(body.stiffening is not None for body in scene.flexible().values()) else None,
     topology={"stations": "flex data"},  # data: index in STATION_DATA of rotation and curvature (3n each)
     numbers={"station_stiffness": "matrix:6", "station_data": "value"},  # of twist and bending (xx yy zz xy xz yz)
-    compose={"forces": {"flexible": "flexible_bodies(<bodies.stiffening>)"}},
 )

@@ -7,6 +7,5 @@ from flexclear.dynamics.effects.effect import Effect
 STOPS = Effect(
     "stops",
     lambda scene: () if scene.stop else None,
-    compose={"forces": {"stops": "<contact.stops.make_stops>({file.forms})"}},
     touches=True,
 )

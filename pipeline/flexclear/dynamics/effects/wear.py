@@ -11,7 +11,6 @@ WEAR = Effect(
     "wear",
     lambda scene: () if scene.wearing_joints() else None,
     topology={"worn": "contact"},  # contacts with wear
-    compose={"forces": {"contacts": "<contact.wear.wearing>({file.given[contacts]})"}},
     changeable=("joint.wear",),
     ledger=True,
 )

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import (
+from flexclear.dynamics.equations.tuples import (
     add,
     at6,
     cross,
@@ -20,6 +19,7 @@ from flexclear.dynamics.vectors import (
     turn_back,
     turn_symmetric,
 )
+from flexclear.dynamics.kernels import kernel
 
 #: outputs of every body, in this order, and how many numbers each is; their sum
 OF_BODIES = {"position": 3, "quaternion": 4, "velocity": 3, "omega": 3, "acceleration": 3, "alpha": 3, "demand": 6}

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.bodies import rigid
-from flexclear.dynamics.choice import nothing
-from flexclear.dynamics.equations.kinematics import make_kinematics
 from flexclear.dynamics.equations.named_bodies import OF_BODIES, SIZE, put_bodies, put_frames
-from flexclear.dynamics.equations.prescribed_motion import prescribe
 from flexclear.dynamics.equations.projection import BLIND, keep_scales, largest, open_by
-from flexclear.dynamics.equations.right_hand_side import make_forces, spread_state
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import ZERO, add, add_wrench, dot, scale
 
 BEARING = m.NAMED["bearing"]
 #: variables of a run's dataset with their dimensions, and coordinates
@@ -169,13 +162,6 @@ def even(rows, first, last):
 
 
 @kernel
-def component_of(d, a, b):
-    """Return the independent mechanism of a part that acts between sites; a may be -1."""
-    other = d.links[d.sites[a].link].component if a >= 0 else -1
-    return max(other, d.links[d.sites[b].link].component)
-
-
-@kernel
 def foresee(d, rows, r, state, closed, states):
     """Add the predicted change by closing the loops to the recorded state in Y; return True when there is one.
 
@@ -197,126 +183,14 @@ def foresee(d, rows, r, state, closed, states):
     return most > 0.0
 
 
-@kernel
-def _origin(d, i):
-    """Return the origin of link i from the kernels' origin, to which its inertia refers."""
-    return d.link_frames[i].origin
-
-
-@kernel
-def _demand_of(d, i, moment, force):
-    """Store the wrench that the accelerations of link i need, about the kernels' origin."""
-    wrench = d.wrench[i]
-    wrench.moment, wrench.force = moment, force
-
-
-@kernel
-def _column(d, k):
-    """Return angular and linear part of a column about the kernels' origin."""
-    return d.columns[k].angular, d.columns[k].linear
-
-
-#: inertia and wrenches about the kernels' origin, where `equations.articulated` has those about the links' own
-ABOUT_ORIGIN = SimpleNamespace(
-    origin=_origin,
-    demand_of=_demand_of,
-    column=_column,
-    localise=nothing,
-    localise_shape=nothing,
-    step=nothing,
-    shift=nothing,
-)
-
-
-def make_description(
-    joints: tuple[Any, ...],
-    flexible: Callable[[Any], rigid.FlexibleBodies] = rigid.all_rigid,
-    contacts: Callable = nothing,
-    loads: Callable = nothing,
-    stops: Callable = nothing,
-    couplings: Callable = nothing,
-    friction: Callable = nothing,
-) -> Callable:
-    """Build the kernel describe(h, f, w, n): motion, wrenches and energies of the last evaluation.
-
-    couplings: subtracts gears' wrenches from their links (`effects.gears`); friction: of ideal joints, in closures
-    (`effects.joint_friction`); the other arguments are those of `make_rates`.
-    """
-    bodies = flexible(ABOUT_ORIGIN)
-    kinematics = make_kinematics(joints, ABOUT_ORIGIN, bodies)
-    forces = make_forces(ABOUT_ORIGIN, bodies, contacts, loads, stops)
-    modal_inertia, flexible_energy = bodies.modal_inertia, bodies.energies
-
-    @kernel
-    def closure_wrenches(d):
-        """Compute the wrench of every closure on its second body, and subtract it from the links it acts on."""
-        for c in range(d.n_closures):
-            closure, moment, force = d.closures[c], ZERO, ZERO
-            for k in range(closure.n_kept):
-                row, size = d.rows[closure.row0 + k], d.multiplier[closure.kept0 + k]
-                moment, force = add(moment, scale(size, row.moment)), add(force, scale(size, row.force))
-            wrench = d.closure_wrench[c]
-            wrench.moment, wrench.force = moment, force
-            on_a, on_b = d.wrench[d.sites[closure.site_a].link], d.wrench[d.sites[closure.site_b].link]
-            add_wrench(on_b, scale(-1.0, moment), scale(-1.0, force))
-            add_wrench(on_a, moment, force)
-        couplings(d)
-        friction(d)
-
-    @kernel
-    def joint_wrenches(d):
-        """Compute the wrench on every link through its inboard joint, at its frames' accelerations (Newton-Euler)."""
-        forces(d)
-        modal_inertia(d)
-        closure_wrenches(d)
-        for i in range(d.n_links - 1, 0, -1):
-            add_wrench(d.wrench[d.links[i].parent], d.wrench[i].moment, d.wrench[i].force)
-
-    @kernel
-    def energies(d):
-        """Compute kinetic energy, potential of gravity, energy stored in bodies and contacts."""
-        for component in range(d.n_components):
-            kinetic, elastic = flexible_energy(d, component)
-            potential = 0.0
-            for i in range(1, d.n_links):
-                if d.links[i].component != component:
-                    continue
-                if d.links[i].flex < 0:
-                    kinetic += rigid.kinetic_energy(d, i)
-                potential -= dot(d.gravity[0].acceleration, d.own[i].moment)
-            for c in range(d.n_contacts):
-                if component_of(d, d.contacts[c].outer, d.contacts[c].inner) == component:
-                    elastic += d.touch[c].stored + d.touch[c].bent
-            for k in range(d.n_loads):
-                if component_of(d, d.loads[k].a, d.loads[k].b) == component:
-                    elastic += d.load[k].stored
-            energy = d.energy[component]
-            energy.kinetic, energy.potential, energy.elastic = kinetic, potential, elastic
-
-    @kernel
-    def describe(h, f, w, n):
-        d = data(h, f, w, n)
-        kinematics(d)  # at the accelerations in DU
-        joint_wrenches(d)
-        energies(d)
-
-    return describe
-
-
-def make_observation(evaluate: Callable, project: Callable, laws: Callable, describe: Callable) -> Callable:
+def make_observation(evaluate: Callable, project: Callable) -> Callable:
     """Build the kernel observe(h, f, w, n, rows, pieces, tolerance, out), which fills the blocks of `room`.
 
-    With a tolerance of AS_RECORDED nothing is evaluated, and only the frames of links are stored.
+    With a tolerance of AS_RECORDED only the frames of links are stored.
 
-    evaluate, project, laws: as the stepper calls them.  describe: of `make_description`.
+    evaluate: the right-hand side, which stores what the record has (`mechanics.record`).  project: as the stepper
+    calls it.
     """
-
-    @kernel
-    def place(d, t):
-        """Compute positions and speeds of the state in Y."""
-        laws(d.h, d.f, d.w, d.n, t)
-        spread_state(d, d.at_y)
-        prescribe(d)
 
     @kernel
     def copy(d, out, every, r, column, frames):
@@ -375,8 +249,11 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
 
     @kernel
     def close(d, t, tolerance):
-        """Close the loops of the state in Y, which has been evaluated, to `tolerance`."""
-        if d.evaluation == m.OK and project(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes, tolerance) < 0:
+        """Close the loops of the state in Y, which has been evaluated, to `tolerance`, and evaluate it again."""
+        moved = project(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes, tolerance) if d.evaluation == m.OK else 0
+        if moved > 0:
+            evaluate(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes)
+        if moved < 0:
             d.evaluation = m.NOT_CLOSED
         if d.evaluation == m.OK and d.n_kept_rows > 0 and d.last_pivot < BLIND:
             d.evaluation = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
@@ -394,16 +271,14 @@ def make_observation(evaluate: Callable, project: Callable, laws: Callable, desc
             foreseen = foreseen and even(rows, first, last)
             while True:
                 state = select(d, rows[r], pieces[r])
-                if tolerance == AS_RECORDED:
-                    place(d, rows[r, 0])
-                    break
                 foreseen = foreseen and foresee(d, rows, r, state, out, states)
                 evaluate(h, f, w, n, rows[r, 0], d.at_y, d.at_slopes)
+                if tolerance == AS_RECORDED:
+                    break
                 if not foreseen or (d.evaluation == m.OK and open_by(d) <= tolerance):
                     close(d, rows[r, 0], tolerance)
                     break
                 uneven, foreseen = first, False  # as where a step ends
-            describe(h, f, w, n)
             if tolerance == AS_RECORDED:
                 copy(d, out, every, r, 0, True)
             else:

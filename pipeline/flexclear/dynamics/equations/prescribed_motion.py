@@ -1,11 +1,10 @@
-"""Known motion: every law of time at the present time, and the prescribed coordinates."""
+"""Every law of time at the present time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.choice import nothing
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import kernel
 
@@ -16,13 +15,8 @@ SHORTEST = 1e-12
 
 
 @kernel
-def prescribe(d):
-    """Set prescribed coordinates, speeds and accelerations from their laws, which are the first ones."""
-    for k in range(d.n_drives):
-        law = d.law[k]
-        d.x[d.nq + k] = law.value
-        d.u[d.nv + k] = law.rate
-        d.du[d.nv + k] = law.second_rate
+def nothing(*given):
+    """No-op in place of harmonics that a mechanism lacks."""
 
 
 @kernel

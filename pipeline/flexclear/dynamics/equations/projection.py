@@ -7,11 +7,8 @@ gap, and vibrate.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.choice import nothing
-from flexclear.dynamics.equations.retraction import make_position_rates
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import kernel
 
@@ -68,87 +65,37 @@ def keep_scales(d):
         d.row_scale[r] = max(d.row_scale[r], d.row_scale[d.n_closure_rows + r])
 
 
-def make_stiffen(closures: Any, tree: Any, flexible: Any) -> Callable:
-    """Build the kernel stiffen(d): the factors of an evaluation, with the modal stiffness added to the mass.
-
-    closures: kernels of all closures.  tree, flexible: as of `make_rates`.
-    """
-    complete, (unfactor, refactor) = closures.complete, tree.make_again(flexible(tree))
-
-    @kernel
-    def stiffen(d):
-        unfactor(d)
-        for k in range(d.n_flex):
-            body = d.flexes[k]
-            n, c0 = body.n_modes, body.c0
-            stiffness = body.interface0 + (3 + n) * n
-            for i in range(n):
-                row = d.envelope[c0 + i].origin + c0
-                # without held shapes, shapes are eigenmodes
-                for j in range(0 if i >= body.n_held > 0 else i, i + 1):
-                    # time over which a gap is closed [s]: modes with shorter periods respond by their stiffness, not by
-                    # their mass
-                    d.mass[row + j] += 0.1**2 * d.interface_data[stiffness + n * i + j].value
-        refactor(d)
-        complete(d)
-
-    return stiffen
-
-
-def make_projection(
-    evaluate: Callable,
-    joints: tuple[Any, ...],
-    closures: Any,
-    stiffen: Callable = nothing,
-    to_modes: Callable = nothing,
-) -> Callable:
+def make_projection(rates: Callable, correct: Callable) -> Callable:
     """Build the kernel project(h, f, w, n, t, y, dy, tolerance).
 
-    evaluate: the right-hand side.  joints: modules of the joint types.  closures: kernels of all closures.
-    stiffen, to_modes: of `make_stiffen` and of `bodies.interface`, for flexible bodies.
+    rates: the right-hand side as steps evaluate it.  correct: stores changes that close the loops, as
+    `mechanics.responses` has them.
     """
-    position_rates, correction = make_position_rates(joints), closures.correction
-
-    @kernel
-    def move(d, y, step):
-        """Add a small displacement of the coordinates to the positions of y."""
-        for k in range(d.nv):
-            d.u[k] = d.w[step + k]
-        position_rates(d)
-        for k in range(d.nq):
-            d.w[y + k] += d.position_rate[k]
 
     @kernel
     def project(h, f, w, n, t, y, dy, tolerance):
         """Correct y until residuals [m] and their rates [m/s] of the selected rows are below `tolerance`.
 
-        It needs the work array of evaluate(t, y), and leaves it, and dy, up to date.  It returns the number of
-        evaluations, or -1 when the loops do not close.  Very near a singular pose, where a residual says little about
-        the error of the state, nothing changes.
+        It needs the residuals of rates(d, t, y, dy), and leaves the work array, and dy, up to date.  It returns the
+        number of evaluations, or -1 when the loops do not close.  Very near a singular pose, where a residual says
+        little about the error of the state, nothing changes.
         """
         d = data(h, f, w, n)
         # redundant rows may have residuals of this fraction of the mechanism's size: rows of joints whose axes miss
         # each other by less than `model.rates.ZERO_SINGULAR_VALUE` are redundant, and open by that, times some turns,
         # during the motion
-        step, used, redundant = d.at_correction, 0, 1e-6 * d.length
+        used, redundant = 0, 1e-6 * d.length
         if d.last_pivot < BLIND:
             return 0
         for _ in range(PROJECTIONS):
             if open_by(d) <= tolerance:
                 return used if widest(d, d.residual, False) <= max(redundant, tolerance) else -1
-            if d.abridged:
-                evaluate(h, f, w, n, t, y, dy)  # for its factors
-            stiffen(d)
+            correct(h, f, w, n, t, y, dy)
             if d.evaluation != m.OK:
                 return -1
-            correction(d, d.at_residual_rate, step)
-            to_modes(d, step)
-            for k in range(d.nv):
-                w[y + d.nq + k] += w[step + k]
-            correction(d, d.at_residual, step)
-            to_modes(d, step)
-            move(d, y, step)
-            evaluate(h, f, w, n, t, y, dy)
+            for k in range(d.nq + d.nv):
+                w[y + k] += w[dy + k]
+            rates(d, t, y, dy)
             used += 1
             if d.evaluation != m.OK:
                 return -1

@@ -44,6 +44,7 @@ class Watch:
         self.hit: tuple[str, float] | None = None
         engine = self._engine
         engine.select_pieces_after(engine.start)
+        closure_rows.select_rows(engine, y, engine.start)
         start = self._observed(rows_of(engine, y[None], engine.start), after=True)
         series = joint_coordinates(engine.model, by_name(start, engine.model.arrays.size))
         turning = {label for label, _, turns in named_coordinates(engine.model.scene) if turns}

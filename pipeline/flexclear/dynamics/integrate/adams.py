@@ -52,7 +52,7 @@ def keep(d, step):
     d.memory[COUNT] = min(d.memory[COUNT] + 1.0, MOST_STEPS_BACK)
 
 
-def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, lists: object) -> tuple:
     """Build the method's kernels; the method has no error estimate."""
     _, proceed = make_stages(evaluate, rk4.A, rk4.B, rk4.C)
     runge_kutta_step = make_attempt(evaluate, proceed)

@@ -125,7 +125,7 @@ def error(d, step):
 extend_step, interpolate = make_dense(STAGES, D)
 
 
-def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, lists: object) -> tuple:
     """Build the method's kernels."""
     stage, proceed = make_stages(evaluate, A, B, C)
 

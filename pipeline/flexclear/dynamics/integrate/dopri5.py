@@ -58,7 +58,7 @@ def error(d, step):
 extend, interpolate = make_dense(STAGES, D)
 
 
-def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, lists: object) -> tuple:
     """Build the method's kernels."""
     _, proceed = make_stages(evaluate, A, B, C, ends=True)  # the error estimate needs the slope there
     return begin_afresh, proceed, error, extend, keep_nothing

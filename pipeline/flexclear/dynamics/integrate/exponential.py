@@ -225,25 +225,18 @@ def error(d, step):
     return fourth**2 / np.sqrt(fourth**2 + 0.01 * third**2)
 
 
-def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, Any]) -> tuple:
-    """Build the method's kernels; whole: an evaluation with all intermediate results, and the module that factors M."""
-    complete, tree = whole
-    find_oscillators = modal_basis.make_find_oscillators(retract, tree)
-
-    @kernel
-    def renew(d):
-        """Compute the oscillators of the state evaluated last."""
-        find_oscillators(d, d.memory[BASIS_KNOWN] > 0.0)
-        d.jacobians += 1
-        d.memory[BASIS_HOLDS], d.memory[BASIS_KNOWN], d.memory[PHI_STEP] = 1.0, 1.0, 0.0
+def make_kernels(evaluate: Callable, lists: Any) -> tuple:
+    """Build the method's kernels."""
+    find_oscillators = modal_basis.make_find_oscillators(lists)
 
     @kernel
     def prepare(d, step):
         """Compute oscillators, phi functions, and the oscillators' parts of state and slope at the step's start."""
         if d.memory[BASIS_HOLDS] == 0.0:
-            complete(d.h, d.f, d.w, d.n, d.time, d.at_y, slope(d, NODE))
+            find_oscillators(d, d.memory[BASIS_KNOWN] > 0.0)
             d.evaluations += 1
-            renew(d)
+            d.jacobians += 1
+            d.memory[BASIS_HOLDS], d.memory[BASIS_KNOWN], d.memory[PHI_STEP] = 1.0, 1.0, 0.0
         if d.memory[PHI_STEP] != step:
             for e in range(NODES):
                 find_phi(d, e, step, C[e])
@@ -310,12 +303,10 @@ def make_kernels(evaluate: Callable, retract: Callable, whole: tuple[Callable, A
 
     @kernel
     def keep(d, step):
-        """Store the cubic of an accepted step for the next prediction; renew oscillators if its end was evaluated."""
+        """Store the cubic of an accepted step for the next prediction."""
         for i in range(NODES * d.ny):
             d.w[vector(d, BEFORE) + i] = d.w[vector(d, DEPARTURE) + i]
         d.memory[LAST_STEP], d.memory[BASIS_HOLDS] = step, 0.0
-        if d.state == d.at_y_new and d.abridged == 0:
-            renew(d)
 
     return begin, proceed, error, extend, keep
 

@@ -44,7 +44,7 @@ MOST_ITERATIONS = 30
 #: vectors of rates: accelerations at the start as stored, rates at the end, accelerations at the start for this step's
 #: length, displacement, residual, row exchanges of the factors; then storage for positions, and the slope at the start
 #: of the previous step
-OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, PIVOTS, POSITIONS, SLOPE_BEFORE, VECTORS = range(9)
+OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, PIVOTS, SLOPE_BEFORE, VECTORS = range(8)
 #: matrices: after the Jacobian Newton's matrix
 NEWTON, MATRICES = 1, 2
 
@@ -160,9 +160,9 @@ def error(d, step):
     return scaled_norm(d, out)
 
 
-def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, lists: Any) -> tuple:
     """Build the method's kernels."""
-    place_end, solve_step = make_newton(evaluate, retract)
+    place_end, solve_step = make_newton(evaluate, lists.retract)
 
     @kernel
     def begin(d):
@@ -211,7 +211,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
             d.w[out + nq + k] = u + step * ((1.0 - gamma) * a + gamma * b)
         for k in range(nv, n_rates(d)):
             d.w[out + nq + k] = d.y[nq + k] + step * d.w[new + k]
-        retract(d, d.at_y, shift, out, vector(d, POSITIONS))
+        retract(d, d.at_y, shift, out)
 
     @kernel
     def residual(d, step):

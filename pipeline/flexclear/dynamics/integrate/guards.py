@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.equations.tuples import add, dot, scale, sub
 from flexclear.dynamics.integrate.stepper import never
 from flexclear.dynamics.integrate.within_step import make_evaluate_at, make_locate, make_repeat
 from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import add, dot, scale, sub
 
 #: how close to its level a guard ends a step, as a fraction of the guard's size over the root of the tolerance: the
 #: error of a step that ends so far beyond falls with the square of it

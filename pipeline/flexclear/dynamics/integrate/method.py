@@ -86,10 +86,9 @@ class Method:
     the slope at the start of a step, the last row belongs to
         the search for events.
     last: row of the slope at the step's end.
-    make_kernels: (evaluate, retract) -> kernels; methods that read more than rates (`Traits.reads_all`) take as third
-        argument an evaluation that leaves all intermediate results, with the module that factors the mass matrix.
-        evaluate(d, t, y, dy) and retract(d, y, displacement, out, scratch) take indices in w. The kernels count their
-        evaluations:
+    make_kernels: (evaluate, lists) -> kernels.
+        evaluate(d, t, y, dy) takes indices in w; lists: module of kernels that run lists of calls (`compile.calls`).
+        The kernels count their evaluations:
         begin(d) is called after every restart, with the slope and the length of the first step known;
         attempt(d, step) fills Y_NEW and returns False when it fails; for a `staged` method proceed(d, step) continues
         to the next evaluation by d.stage, 0 at first, and returns AWAITS (`await_rates`), MADE or LOST;

@@ -1,4 +1,4 @@
-r"""Vibrations of the constrained mechanism under its modal stiffness, in the state evaluated last.
+r"""Vibrations of the constrained mechanism under its modal stiffness.
 
 With M the mass matrix, J the closures' Jacobian and K the modal stiffness, the modes' springs accelerate the
 coordinates by :math:`-P K q`, where :math:`P = M^{-1} - M^{-1}J^T(JM^{-1}J^T)^{-1}JM^{-1}`. The symmetric
@@ -20,15 +20,10 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.bodies.interface import to_interface, to_modes
-from flexclear.dynamics.equations.closures import add_spread, solve, take_spread
 from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import dot
 
 #: oscillators below this fraction of the largest frequency are not stiff, and are integrated with the rest
 NOT_STIFF = 1e-6
-#: largest change of a coordinate in the finite differences of the positions' rates
-POSITION_CHANGE = 1e-9
 
 
 @kernel
@@ -42,7 +37,7 @@ def lifting(d, i):
 
 @kernel
 def response(d, j):
-    """Return the index in w of the accelerations by the root of spring j's stiffness, the drives' power, its rate."""
+    """Return the index in w of the rates by the root of spring j's stiffness, the drives' power, its rate."""
     return d.at_response + d.ny * j
 
 
@@ -188,107 +183,47 @@ def damp(d, i):
     return d.oscillators[i].square * total
 
 
-def make_responses(tree: Any) -> Callable:
-    """Build the kernel responses(d); tree: the module that factors the mass matrix."""
-    forward, backward, inertial_power = tree.forward, tree.backward, tree.drive_power
+@kernel
+def shapes(d, n):
+    """Fill rows of C and shapes of B from responses, axes and squares; slow oscillators get none."""
+    nv, largest = d.nv, 0.0
+    for i in range(n):
+        largest = max(largest, d.coupling[(nv + 1) * i])
+    for i in range(n):
+        shape, omega2 = lifting(d, i), d.coupling[(nv + 1) * i]
+        stiff = omega2 > NOT_STIFF * NOT_STIFF * largest
+        d.oscillators[i].square = omega2 if stiff else 0.0
+        for j in range(n):
+            d.reading[nv * i + j] = d.axes[nv * i + j] * d.oscillators[j].root
+        for c in range(d.ny):
+            d.w[shape + c] = 0.0
+        for j in range(n if stiff else 0):
+            part, weight = response(d, j), d.axes[nv * i + j] / omega2
+            for c in range(d.ny):
+                d.w[shape + c] += weight * d.w[part + c]
 
-    @kernel
-    def constrained(d, b):
-        """Apply P to the forces in w from index b, by the factors of an evaluation; the multipliers remain stored.
 
-        Modes are in the interface basis.
-        """
-        forward(d, b)
-        for k in range(d.at_multiplier, d.at_multiplier + d.n_kept_rows):
-            d.w[k] = 0.0
-        take_spread(d, b)
-        solve(d)
-        add_spread(d, b, 1.0)
-        backward(d, b)
-
-    @kernel
-    def drive_power(d, b, motion):
-        """Return the drives' power at the accelerations at index b and their multipliers.
-
-        motion: U for the power, DU for the rate at which it grows with the drives' speeds.
-        """
-        power = inertial_power(d, b, motion)
-        for e in range(d.n_known_entries):
-            entry, closure = d.known_entries[e], d.closures[d.known_entries[e].closure]
-            column, speed = d.columns[entry.column], d.w[motion + d.nv + entry.drive]
-            for k in range(closure.n_kept):
-                wrench = d.rows[closure.row0 + k]
-                along = dot(wrench.moment, column.angular) + dot(wrench.force, column.linear)
-                power -= entry.sign * along * d.multiplier[closure.kept0 + k] * speed
-        return power
-
-    @kernel
-    def respond(d, b):
-        """Replace the forces in w from index b by their accelerations, followed by the drives' power and its rate."""
-        nv = d.nv
-        constrained(d, b)
-        d.w[b + nv] += drive_power(d, b, d.at_u)
-        d.w[b + nv + 1] += drive_power(d, b, d.at_du)
-        to_modes(d, b)
+def make_find_oscillators(lists: Any) -> Callable:
+    """Build the kernel find_oscillators(d, known), for the state in Y; lists: as of `method.Method.make_kernels`."""
+    factor_springs, release_spring = lists.factor_springs, lists.release_spring
 
     @kernel
     def responses(d):
         """Compute the responses to the root of each mode's stiffness, and the symmetric matrix."""
-        nq, nv, e = d.nq, d.nv, 0
-        for i in range(count(d)):
-            for k in range(nq, nq + nv + 2):
-                d.w[response(d, i) + k] = 0.0
+        e = 0
+        factor_springs(d, d.time, d.at_y)
         for k in range(d.n_flex):
             size, c0 = d.flexes[k].n_modes, d.flexes[k].c0
             stiffness = d.at_flex_data + d.flexes[k].data0 + 12 * size + size * size
             for j in range(size):
-                root, b = np.sqrt(max(d.f[stiffness + j], 0.0)), response(d, e) + nq
-                d.oscillators[e].root = d.w[b + c0 + j] = root
-                to_interface(d, b)
-                respond(d, b)
+                b = response(d, e)
+                for c in range(d.ny):
+                    d.w[b + c] = 0.0
+                d.oscillators[e].root = d.w[b + d.nq + c0 + j] = np.sqrt(max(d.f[stiffness + j], 0.0))
+                release_spring(d, d.time, d.at_y, b)
                 e += 1
         for i in range(e):
             couple(d, i)
-
-    return responses
-
-
-def make_find_oscillators(retract: Callable, tree: Any) -> Callable:
-    """Build the kernel find_oscillators(d, known), for the state in Y or Y_NEW evaluated last."""
-    responses = make_responses(tree)
-
-    @kernel
-    def shapes(d, state, n):
-        """Fill rows of C and shapes of B from responses, axes and squares; slow oscillators get none."""
-        nq, nv, largest = d.nq, d.nv, 0.0
-        for i in range(n):
-            largest = max(largest, d.coupling[(nv + 1) * i])
-        for i in range(n):
-            shape, omega2 = lifting(d, i), d.coupling[(nv + 1) * i]
-            stiff = omega2 > NOT_STIFF * NOT_STIFF * largest
-            d.oscillators[i].square = omega2 if stiff else 0.0
-            for j in range(n):
-                d.reading[nv * i + j] = d.axes[nv * i + j] * d.oscillators[j].root
-            for c in range(d.ny):
-                d.w[shape + c] = 0.0
-            if not stiff:
-                continue
-            for j in range(n):
-                part, weight = response(d, j), d.axes[nv * i + j] / omega2
-                for c in range(nq, nq + nv + 2):
-                    d.w[shape + c] += weight * d.w[part + c]
-        for i in range(n):
-            # the responses are no longer needed: their storage serves a displacement, the resulting positions, and the
-            # change
-            shape, spare, longest = lifting(d, i), response(d, 0), 0.0
-            for c in range(nv):
-                longest = max(longest, abs(d.w[shape + nq + c]))
-            if longest > 0.0:
-                for c in range(nv):
-                    d.w[spare + c] = d.w[shape + nq + c] * (POSITION_CHANGE / longest)
-                retract(d, state, spare, spare + nv, spare + nv + nq)
-                for c in range(nq):
-                    d.w[shape + c] = d.w[spare + nv + nq + c] * (longest / POSITION_CHANGE)
 
     @kernel
     def find_oscillators(d, known):
@@ -302,7 +237,7 @@ def make_find_oscillators(retract: Callable, tree: Any) -> Callable:
                 for j in range(size):
                     d.axes[d.nv * i + j] = 1.0 if i == j else 0.0
         diagonalise(d, size)
-        shapes(d, d.state, size)
+        shapes(d, size)
         for i in range(size):
             d.oscillators[i].damping = damp(d, i)
 

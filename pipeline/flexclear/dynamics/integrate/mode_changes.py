@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from flexclear.dynamics.equations.tuples import dot, sub
 from flexclear.dynamics.integrate.within_step import ROOT_CORRECTION
 from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import dot, sub
 
 ROOT_ITERATIONS, TURN_ITERATIONS = 60, 40
 #: returned in place of a fraction of the step when the mode does not change

@@ -207,7 +207,7 @@ def estimate(d, step, start):
     return scaled_norm(d, out)
 
 
-def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, lists: object) -> tuple:
     """Build the method's kernels."""
 
     @kernel

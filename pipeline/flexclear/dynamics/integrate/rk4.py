@@ -21,7 +21,7 @@ B = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
 C = np.array([0.0, 0.5, 0.5, 1.0])
 
 
-def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, lists: object) -> tuple:
     """Build the method's kernels; the method has no error estimate."""
     _, proceed = make_stages(evaluate, A, B, C)
     return begin_afresh, proceed, None, hermite.make_extend(STAGES), keep_nothing

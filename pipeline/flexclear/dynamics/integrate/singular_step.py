@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.equations.envelope import base
 from flexclear.dynamics.equations.projection import BLIND
 from flexclear.dynamics.kernels import kernel
 
@@ -35,7 +34,7 @@ TOO_LITTLE = 2e-4
 @kernel
 def pivot(d, r):
     """Return the independence of selected row r from the rows before it, after an evaluation: a length in M^-1."""
-    return 1.0 / abs(d.w[base(d.h, d.at_closure_envelope, d.at_schur, r) + r])
+    return 1.0 / abs(d.schur[d.closure_envelope[r].origin + r])
 
 
 @kernel

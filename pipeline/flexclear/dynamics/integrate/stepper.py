@@ -94,12 +94,9 @@ class Stepping(NamedTuple):
     dense: Any
 
 
-def make_stepping(
-    evaluate: Callable, retract: Callable, method: Any, poses: Any = None, complete: tuple[Callable, Any] | None = None
-) -> Stepping:
+def make_stepping(evaluate: Callable, lists: Any, method: Any, poses: Any = None) -> Stepping:
     """Build the kernels of steps, which event resolution also uses; arguments as of `make_advance`."""
-    given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
-    begin, step, error, extend, keep = method.make_kernels(*given)
+    begin, step, error, extend, keep = method.make_kernels(evaluate, lists)
     proceed = step if method.staged else make_at_once(step)
     attempt = make_attempt(evaluate, proceed) if method.staged else step
     if poses is None:
@@ -111,17 +108,16 @@ def make_stepping(
 def make_resolution(
     evaluate: Callable,
     project: Callable,
-    retract: Callable,
+    lists: Any,
     method: Any,
     events: tuple[Callable, Callable, Callable],
     poses: Any = None,
-    complete: tuple[Callable, Any] | None = None,
 ) -> Callable:
     """Build the kernel resolution(d, step, t_new, rows, events) -> event?, which stores the other results of `resolve`.
 
     It is compiled concurrently with the steps, and takes as long. Arguments as of `make_advance`.
     """
-    stepping = make_stepping(evaluate, retract, method, poses, complete)
+    stepping = make_stepping(evaluate, lists, method, poses)
     _, make_resolve_events, _ = events
     resolve_events = make_resolve_events(evaluate, stepping.attempt, stepping.extend, project, stepping.dense)
 
@@ -137,26 +133,24 @@ def make_resolution(
 def make_advance(
     evaluate: Callable,
     project: Callable,
-    retract: Callable,
+    lists: Any,
     method: Any,
     stepping: Any,
     events: tuple[Callable, Callable | None, Callable] = NO_CONTACTS,
     resolve: Callable = resolve_nothing,
     poses: Any = None,
-    complete: tuple[Callable, Any] | None = None,
 ) -> Callable:
     """Build the kernel advance(h, f, w, n, outputs, rows, events).
 
     Its parts take `d`, the arrays with named fields (`fields`), instead of h, f, w and n.
 
-    complete: an `evaluate` that leaves all intermediate results, and the module that factors the mass matrix; given to
-    methods that read more than rates. stepping: the module `adaptive` or `fixed`.  poses: `singular_step` for
+    stepping: the module `adaptive` or `fixed`.  poses: `singular_step` for
     mechanisms with loops; trees do not compile it. events: watch_start, make_resolve_events and any_closed of
     `contact_events` or `step_end_events`. resolve: (d, step, t_new, rows, events) -> (event?, dense output ready?, end,
     step), for an accepted step
         (`make_resolution`).
     """
-    made = make_stepping(evaluate, retract, method, poses, complete)
+    made = make_stepping(evaluate, lists, method, poses)
     begin, proceed, error, keep, loops = made.begin, made.proceed, made.error, made.keep, poses is not None
     foresee: Any = None
     arrive: Any = None

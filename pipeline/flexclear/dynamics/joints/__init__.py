@@ -1,10 +1,9 @@
 """Joint types. To add one: a module here, a line in the table, and that type in scene/parts; the family tests include
 it automatically.
 
-Each is a module, or an object of `turn_and_slide`, with the kernels
-- ``motion(w, x, u, S) -> R_FG, p_FG, bias``: pose of the second frame in the first, motion subspace and bias
-  (see `spherical.motion`);
-- ``position_rate(w, x, u, rate)``: rates of the positions at the speeds;
+Each is a module, or an object of `turn_and_slide`, with the functions of numbers that may be symbols
+- ``motion(x, u)``: `relative.Relative` motion of the second frame in the first at positions and speeds;
+- ``position_rate(x, u)``: rates of the positions;
 
 and with
 - ``POSITIONS``, ``SPEEDS``: coordinates of a tree joint of this type, one letter each (r, t);
@@ -17,10 +16,12 @@ and with
 
 from __future__ import annotations
 
+from typing import Any
+
 from flexclear.dynamics.joints import free, rotation_vector, spherical, turn_and_slide, universal
 
 #: by type; no scene can name rotation vectors, of prescribed paths, and what holds a loose slider in a plane
-JOINTS = {
+JOINTS: dict[str, Any] = {
     "spherical": spherical,
     "revolute": turn_and_slide.REVOLUTE,
     "universal": universal,

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2
 from typing import Any
 
 import numpy as np
-
-from flexclear.dynamics.kernels import kernel
 
 
 @dataclass(frozen=True)
@@ -78,14 +75,3 @@ def angle_about(R: np.ndarray, axis: int = 2) -> float:
     """Return the angle [rad] in (-pi, pi] of the rotation about an axis that equals R or is nearest to R."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     return float(np.arctan2(R[j, i] - R[i, j], R[i, i] + R[j, j]))
-
-
-def rates_are_speeds(count: int) -> Callable:
-    """Build `position_rate` for a joint of `count` speeds, each of which is the rate of a position."""
-
-    @kernel
-    def position_rate(w, x, u, rate):
-        for k in range(count):
-            w[rate + k] = w[u + k]
-
-    return position_rate

@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import ZERO, at, from_quaternion, put, quaternion_rate
+from flexclear.dynamics.joints.relative import Relative, from_quaternion, quaternion_rate
+from flexclear.dynamics.vectors import AXES, ZERO, Twist, Vector
 from flexclear.numerics.rotations import matrix_to_quaternion
 
 
-@kernel
-def motion(w, x, u, S):
-    """Compute the motion of frame G in frame F: quaternion and position from x, 7 numbers (see `spherical.motion`).
-
-    u: angular velocity, then velocity of G's origin, components in F, 6 numbers.
-    """
-    for k in range(36):
-        w[S + k] = 0.0
-    for k in range(6):
-        w[S + 7 * k] = 1.0
-    return from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3]), at(w, x + 4), ZERO, ZERO
+def motion(x: Any, u: Any) -> Relative:
+    """Return the motion by quaternion and position; speeds: angular velocity, then velocity of G's origin."""
+    S = [*(Twist(axis, ZERO) for axis in AXES), *(Twist(ZERO, axis) for axis in AXES)]
+    return Relative(from_quaternion(x[:4]), Vector(x[4:]), S)
 
 
-@kernel
-def position_rate(w, x, u, rate):
-    """Store the rates of quaternion and position."""
-    quaternion_rate(w, x, u, rate)
-    put(w, rate + 4, at(w, u + 3))
+def position_rate(x: Any, u: Any) -> list[Any]:
+    """Return the rates of quaternion and position."""
+    return [*quaternion_rate(x[:4], u[:3]), *u[3:]]
 
 
 POSITIONS, SPEEDS = "rrrrttt", "rrrttt"  #: r: rotation [rad or -], t: translation [m]

@@ -8,52 +8,64 @@ Singular at angles of 2 pi.  Source: Bauchau (2011), Flexible Multibody Dynamics
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import ZERO, about, add, at, cross, dot, put, scale
+from flexclear.dynamics.joints.relative import Relative, rates_are_speeds
+from flexclear.dynamics.specialise.symbols import branch, sin, sqrt
+from flexclear.dynamics.vectors import UNIT, ZERO, Matrix, Twist, Vector, cross, dot, skew
 from flexclear.numerics.rotations import matrix_to_quaternion
 
+#: squared angle [rad^2] below which functions of rotation vectors come from their series; the next terms are below
+#: rounding there
+SERIES_ANGLE = 1e-2
 
-@kernel
-def _functions(s):
-    """Return sin/angle, a, b and the derivatives of a and b by s = angle^2."""
-    # angle^2 below which the functions come from their series; their next terms are below rounding there
-    if s < 1e-2:
-        c = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)))
-        a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0))))
-        b = (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))) / 6.0
-        da = -(1.0 - s / 15.0 * (1.0 - s * 3.0 / 112.0 * (1.0 - s * 2.0 / 135.0))) / 24.0
-        db = -(1.0 - s / 21.0 * (1.0 - s / 48.0 * (1.0 - s * 2.0 / 165.0))) / 120.0
-        return c, a, b, da, db
-    angle = np.sqrt(s)
-    c = np.sin(angle) / angle
-    a = 2.0 * np.sin(0.5 * angle) ** 2 / s
+
+def motion(x: Any, u: Any) -> Relative:
+    """Return the motion by a rotation vector."""
+    x, u = Vector(x), Vector(u)
+    s = dot(x, x)
+    R_FG, T, bias = rotation(x, u, branch(s < SERIES_ANGLE, lambda: series(s), lambda: closed(s)))
+    return Relative(R_FG, ZERO, [Twist(T.column(k), ZERO) for k in range(3)], Twist(bias, ZERO))
+
+
+def rotation(x: Vector, u: Vector, coefficients: Sequence[Any]) -> tuple[Matrix, Matrix, Vector]:
+    """Return the rotation by a vector x of rate u, T with omega = T u, and the rate of omega at constant u.
+
+    coefficients: at the squared angle, see `series`.
+    """
+    X, ds, xu = skew(x), 2.0 * dot(x, u), cross(x, u)
+    c, a, b, da, db = coefficients
+    bias = da * ds * xu + db * ds * cross(x, xu) + b * cross(u, xu)
+    return UNIT + c * X + a * (X @ X), UNIT + a * X + b * (X @ X), bias
+
+
+def closed(s: Any) -> tuple[Any, ...]:
+    """Return the same as `series`, away from s = 0."""
+    angle = sqrt(s)
+    c, half = sin(angle) / angle, sin(0.5 * angle)
+    a = 2.0 * half * half / s
     b = (1.0 - c) / s
     return c, a, b, (0.5 * c - a) / s, (0.5 * a - 1.5 * b) / s
 
 
-@kernel
-def motion(w, x, u, S):
-    """Compute the motion of frame G in frame F: rotation vector from x (see `spherical.motion`)."""
-    v, r = at(w, x), at(w, u)
-    c, a, b, da, db = _functions(dot(v, v))
-    for k in range(3):
-        unit = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
-        vu = cross(v, unit)
-        put(w, S + 6 * k, add(unit, add(scale(a, vu), scale(b, cross(v, vu)))))
-        put(w, S + 6 * k + 3, ZERO)
-    vr, ds = cross(v, r), 2.0 * dot(v, r)
-    bias = add(add(scale(da * ds, vr), scale(db * ds, cross(v, vr))), scale(b, cross(r, vr)))
-    return about(v, c, a), ZERO, bias, ZERO
+def series(s: Any) -> tuple[Any, ...]:
+    """Return sin/angle, a = (1 - cos)/angle^2, b = (angle - sin)/angle^3 and the rates of a and b by s = angle^2.
+
+    They are exact below about one radian.
+    """
+    c = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
+    a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
+    b = (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))) / 6.0
+    da = -(1.0 - s / 15.0 * (1.0 - s * 3.0 / 112.0 * (1.0 - s * 2.0 / 135.0))) / 24.0
+    db = -(1.0 - s / 21.0 * (1.0 - s / 48.0 * (1.0 - s * 2.0 / 165.0))) / 120.0
+    return c, a, b, da, db
 
 
-@kernel
-def position_rate(w, x, u, rate):
-    """Store the rate of the vector, which is the speed."""
-    put(w, rate, at(w, u))
-
+position_rate = rates_are_speeds
 
 POSITIONS, SPEEDS = "rrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
 TRANSLATIONS: tuple[int, ...] = (0, 1, 2)

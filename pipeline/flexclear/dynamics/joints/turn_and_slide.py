@@ -4,32 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from flexclear.dynamics.joints.coordinate import (
-    ROTATION,
-    ROTATION_Y,
-    TRANSLATION,
-    Coordinate,
-    angle_about,
-    rates_are_speeds,
-)
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import IDENTITY, ZERO, about_y, about_z
+from flexclear.dynamics.joints.coordinate import ROTATION, ROTATION_Y, TRANSLATION, Coordinate, angle_about
+from flexclear.dynamics.joints.relative import Relative, rates_are_speeds
+from flexclear.dynamics.specialise.symbols import cos, sin
+from flexclear.dynamics.vectors import AXES, UNIT, ZERO, Matrix, Twist, Vector
+
+#: stands for the turn among the axes of slides
+TURN = -1
 
 
 @dataclass(frozen=True)
 class Joint:
-    """Interface of a joint type (see `joints`), with kernels made for its coordinates."""
+    """Interface of a joint type (see `joints`), made for its coordinates."""
 
     COORDINATES: tuple[Coordinate, ...]
     POSITIONS: str
     SPEEDS: str
     TRANSLATIONS: tuple[int, ...]
     ROTATIONS: tuple[tuple[int, int], ...]
-    motion: Callable
-    position_rate: Callable
+    motion: Callable[[Any, Any], Relative]
+    position_rate: Callable[[Any, Any], Any] = rates_are_speeds
 
     def coordinates(self, R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Return angles [rad] in (-pi, pi] and displacements [m] of a relative pose, one per coordinate."""
@@ -38,28 +36,33 @@ class Joint:
 
 def joint(*coordinates: Coordinate) -> Joint:
     """Build the joint that leaves these coordinates free, at most one of which is an angle."""
-    count, places = len(coordinates), {-1 if one.turning else one.axis: k for k, one in enumerate(coordinates)}
-    turn, x, y, z = (places.get(place, -1) for place in (-1, 0, 1, 2))
-    ones = (*(6 * k + (0 if one.turning else 3) + one.axis for k, one in enumerate(coordinates)), 0)
-    axis = coordinates[turn].axis if turn >= 0 else 2
-    about = about_y if axis == 1 else about_z
+    places = {TURN if one.turning else one.axis: k for k, one in enumerate(coordinates)}
+    turned = next((one.axis for one in coordinates if one.turning), 2)
+    about = about_y if turned == 1 else about_z
+    S = [Twist(AXES[one.axis], ZERO) if one.turning else Twist(ZERO, AXES[one.axis]) for one in coordinates]
 
-    @kernel
-    def motion(w, q, u, S):
-        """Compute the motion of G in F (see `spherical.motion`); eqs. (30), (31) for a slide along one axis."""
-        for k in range(6 * count):
-            w[S + k] = 0.0
-        for k in range(count):
-            w[S + ones[k]] = 1.0
-        R = about(w[q + turn]) if turn >= 0 else IDENTITY
-        p = (w[q + x] if x >= 0 else 0.0, w[q + y] if y >= 0 else 0.0, w[q + z] if z >= 0 else 0.0)
-        return R, p, ZERO, ZERO
+    def motion(x: Any, u: Any) -> Relative:
+        """Return the motion of G in F; eqs. (30), (31) for a slide along one axis."""
+        R_FG = about(x[places[TURN]]) if TURN in places else UNIT
+        return Relative(R_FG, Vector([x[places[axis]] if axis in places else 0.0 for axis in range(3)]), S)
 
     letters = "".join("r" if one.turning else "t" for one in coordinates)
     held = tuple(axis for axis in range(3) if axis not in places)
-    turned = tuple((axis, other) for other in range(3) if other != axis)
-    perpendicular = turned if turn >= 0 else ((0, 1), (1, 2), (2, 0))
-    return Joint(coordinates, letters, letters, held, perpendicular, motion, rates_are_speeds(count))
+    across = tuple((turned, other) for other in range(3) if other != turned)
+    perpendicular = across if TURN in places else ((0, 1), (1, 2), (2, 0))
+    return Joint(coordinates, letters, letters, held, perpendicular, motion)
+
+
+def about_z(angle: Any) -> Matrix:
+    """Return the rotation about z by an angle [rad]."""
+    c, s = cos(angle), sin(angle)
+    return Matrix([c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0])
+
+
+def about_y(angle: Any) -> Matrix:
+    """Return the rotation about y by an angle [rad]."""
+    c, s = cos(angle), sin(angle)
+    return Matrix([c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c])
 
 
 #: in the tree only where one of the two bodies is flexible

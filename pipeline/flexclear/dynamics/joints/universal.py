@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from flexclear.dynamics.joints.coordinate import Coordinate, rates_are_speeds
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import ZERO, cross, put, scale
+from flexclear.dynamics.joints.coordinate import Coordinate
+from flexclear.dynamics.joints.relative import Relative, rates_are_speeds
+from flexclear.dynamics.specialise.symbols import cos, sin
+from flexclear.dynamics.vectors import AXES, ZERO, Matrix, Twist, Vector, cross
 
 
-@kernel
-def motion(w, x, u, S):
-    """Compute the motion of frame G in frame F: R_FG = R_x(x0) R_y(x1) (see `spherical.motion`)."""
-    ca, sa, cb, sb = np.cos(w[x]), np.sin(w[x]), np.cos(w[x + 1]), np.sin(w[x + 1])
-    first, second = (1.0, 0.0, 0.0), (0.0, ca, sa)
-    put(w, S, first)
-    put(w, S + 3, ZERO)
-    put(w, S + 6, second)
-    put(w, S + 9, ZERO)
-    R = (cb, 0.0, sb, sa * sb, ca, -sa * cb, -ca * sb, sa, ca * cb)
-    return R, ZERO, scale(w[u] * w[u + 1], cross(first, second)), ZERO
+def motion(x: Any, u: Any) -> Relative:
+    """Return the motion by R_FG = R_x(x0) R_y(x1)."""
+    (ca, sa), (cb, sb) = ((cos(angle), sin(angle)) for angle in x)
+    first, second = AXES[0], Vector([0.0, ca, sa])
+    R_FG = Matrix([cb, 0.0, sb, sa * sb, ca, -sa * cb, -ca * sb, sa, ca * cb])
+    bias = Twist(u[0] * u[1] * cross(first, second), ZERO)
+    return Relative(R_FG, ZERO, [Twist(first, ZERO), Twist(second, ZERO)], bias)
 
 
-position_rate = rates_are_speeds(2)
+position_rate = rates_are_speeds
 
 POSITIONS, SPEEDS = "rr", "rr"  #: r: rotation [rad or -], t: translation [m]
 TRANSLATIONS: tuple[int, ...] = (0, 1, 2)

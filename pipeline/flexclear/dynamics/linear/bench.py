@@ -22,7 +22,6 @@ from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.run.evaluation import closure_rows, observation
 from flexclear.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.dynamics.run.evaluation.start import NO_IMPACT
-from flexclear.dynamics.run.evaluation.tree_factor import bias, carried_wrenches, mass_factor
 from flexclear.dynamics.run.run import with_driven_actuators, with_start_state
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene
@@ -73,12 +72,23 @@ class Balance:
     bias: negative generalised forces, shape (nv,).  mass: (nv, nv).
     jacobian: rows solved for, (rows, nv).
     slip: rates at which the loops open along these rows, shape (rows,).
+    acting: wrenches of inertia, gravity, loads and contacts on each link with its subtree, and those of each load and
+    contact alone, as moments [N m].
     """
 
     bias: np.ndarray
     mass: np.ndarray
     jacobian: np.ndarray
     slip: np.ndarray
+    acting: np.ndarray
+
+    @property
+    def moment(self) -> float:
+        """Size of the forces that balance each other, as moments [N m].
+
+        Their sum along the free coordinates is no measure: in balance it is rounding.
+        """
+        return float(np.max(np.abs(self.acting), initial=0.0))
 
 
 def hold(
@@ -129,9 +139,9 @@ def drive_number(model: Model, name: str) -> int:
 def drive_state(engine: Engine, time: float) -> np.ndarray:
     """Return position and speed of every drive at a time, in the tree's sense, shape (known, 2)."""
     engine.select_pieces_after(time)
-    # every evaluation stores the laws' values; the pose does not matter
-    closure_rows.evaluate(engine, initial.start_state(engine.model), time)
-    return np.stack([engine.view(m.X)[engine.model.nq :], engine.view(m.U)[engine.model.nv :]], axis=1)
+    engine.evaluate_laws(time)
+    laws = engine.table(m.LAW)[: len(engine.model.drives)]
+    return np.stack([laws["value"], laws["rate"]], axis=1)
 
 
 def set_drives(bench: Bench, drives: np.ndarray) -> None:
@@ -234,36 +244,26 @@ def displacement_map(bench: Bench, q: np.ndarray) -> np.ndarray:
 
 def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance:
     """Return forces, mass and closure rows in a state; raise SolverError where forces are not finite."""
-    engine = bench.engine
+    from flexclear.dynamics.run.evaluation.matrices import holding_forces  # here: it imports the compiler
+
+    engine, model = bench.engine, bench.model
     closure_rows.evaluate(engine, state(bench, q, v), bench.time)
-    forces = bias(engine)
+    forces, on_links = holding_forces(engine)
     if not np.all(np.isfinite(forces)):
         raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")
-    slip = engine.view(m.RESIDUAL_RATE)[selection.selected_indices(engine.model, engine.h)]
-    return Balance(modes_of(engine.model.arrays) @ forces, *inertia(engine), slip)
+    slip = engine.view(m.RESIDUAL_RATE)[selection.selected_indices(model, engine.h)]
+    loads, touch = (engine.table(table) for table in (m.LOAD, m.TOUCH))
+    length, moments = model.length, [on_links[:, :3], loads["moment"]]
+    reach = length / arms(model.mechanism)  # ends of angles have torques
+    pushes = [length * on_links[:, 3:], length * loads["force"], reach[:, None] * touch["force"]]
+    acting = np.concatenate([v.ravel() for v in [*pushes, *moments]])
+    return Balance(modes_of(model.arrays) @ forces, *inertia(engine), slip, acting)
 
 
 def inertia(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
     """Return mass and closure Jacobian in the state evaluated last, shapes (nv, nv) and (rows, nv)."""
+    from flexclear.dynamics.run.evaluation.matrices import Matrices
+
     modes = modes_of(engine.model.arrays)
-    L = modes @ mass_factor(engine)
-    return L @ L.T, engine.rows(m.JACOBIAN) @ modes.T
-
-
-def balancing_moment(bench: Bench) -> float:
-    """Return the size of the forces that balance each other in the state evaluated last, as moments [N m].
-
-    Their sum along the free coordinates is no measure: in balance it is rounding.
-    """
-    return float(np.max(np.abs(acting_wrenches(bench)), initial=0.0))
-
-
-def acting_wrenches(bench: Bench) -> np.ndarray:
-    """Return wrenches of inertia, gravity, loads and contacts on each link with its subtree, and those of each load and
-    contact alone, in the state evaluated last, as moments [N m]."""
-    moments, forces = carried_wrenches(bench.engine)
-    loads, touch = (bench.engine.table(table) for table in (m.LOAD, m.TOUCH))
-    length = bench.model.length
-    reach = length / arms(bench.model.mechanism)  # ends of angles have torques
-    pushes = [length * forces, length * loads["force"], reach[:, None] * touch["force"]]
-    return np.concatenate([v.ravel() for v in [*pushes, moments, loads["moment"]]])
+    L = modes @ Matrices(engine).factor
+    return L @ L.T, engine.jacobian @ modes.T

@@ -29,7 +29,6 @@ from flexclear.dynamics.linear.bench import (
     Bench,
     approach_in_steps,
     balance,
-    balancing_moment,
     close,
     hold,
     moved_on,
@@ -299,14 +298,14 @@ def _is_steady(bench: Bench, at: Tangent) -> bool:
     if fastest == 0.0:
         return True
     model, before = bench.model, balance(bench, at.q)
-    forces = balancing_moment(bench)
+    forces = before.moment
     units = row_units(model, bench.engine.h, model.length)
     loops = float(np.max(np.abs(before.slip) / units, initial=0.0))
     if loops > STEADY * fastest:
         return False
     with moved_on(bench, PROBE / fastest) as later:
         after = balance(later, at.q)
-        forces = max(forces, balancing_moment(later))
+        forces = max(forces, after.moment)
     change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
     return change <= STEADY * forces + _rounding_moment(bench, at)
 

@@ -61,7 +61,7 @@ def _energy_of_rigid_body(body: RigidBody, motion: Motion) -> np.ndarray:
 
 
 def _energy_of_flexible_body(bundle: Labelled, frame: Motion, q: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Return twice the kinetic energy of a modally reduced body whose frame moves; see `bodies.flexible`."""
+    """Return twice the kinetic energy of a modally reduced body whose frame moves; see `mechanics.flexible`."""
     v, omega = _relative(frame)
     E, C = (bundle[n].values for n in ("position_mode_moment", "modal_first_moment"))
     F = bundle["mode_mode_moment"].values + bundle["second_order_moment"].values

@@ -2,7 +2,7 @@ r"""State space about a pose in balance: :math:`\dot x = Ax + Bu`, :math:`y = Cx
 
 States are independent coordinates of the tree, their rates, and those internal states on which forces depend, such as
 the integral part of a controller. Inputs are the values of the loads' laws, and their rates where forces depend on
-these. A and B come from the kernels on dual numbers; C and D from the code that records quantities, by differences over
+these. A and B come from routines on dual numbers; C and D from the code that records quantities, by differences over
 four points whose step is chosen for each entry.
 """
 
@@ -29,7 +29,6 @@ from flexclear.dynamics.model.loads import describe
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record.dataset import attributes, series, subject
 from flexclear.dynamics.record.motion import Motions
-from flexclear.dynamics.run.evaluation.tree_factor import bias
 from flexclear.dynamics.sensitivity.parameters import central
 from flexclear.dynamics.specialise import dual
 from flexclear.scene.loads import SampledPid
@@ -93,15 +92,15 @@ class Directions:
 
     def effects(self) -> tuple[np.ndarray, np.ndarray]:
         """Return changes of forces at constant closure rows, (directions, nv), and of rates of `inner`."""
-        states, engine = self.states, self.bench.engine
-        laws = np.zeros((len(self.inputs), self.bench.model.arrays.size(m.N_LAWS) * m.LAW.size))
+        states, model = self.states, self.bench.model
+        laws = np.zeros((len(self.inputs), model.arrays.size(m.N_LAWS) * m.LAW.size))
         for row, one in zip(laws, self.inputs, strict=True):
             row[one.number * m.LAW.size + (m.LAW.rate if one.of_rate else m.LAW.value)] = 1.0
         still, same = np.zeros((len(laws), states.shape[1])), np.zeros((len(states), laws.shape[1]))
-        w = changed(self.bench, self.at.q, np.vstack([states, still]), np.vstack([same, laws]))
+        rates = changed(self.bench, self.at.q, np.vstack([states, still]), laws=np.vstack([same, laws]))
         count = len(states) + len(laws)
-        forces = dual.changes(bias(engine, w), count) @ modes_of(self.bench.model.arrays).T
-        return forces, dual.changes(w[engine.h[m.SLOPES] + self.inner], count)
+        forces = dual.changes(rates[model.speeds], count) @ modes_of(model.arrays).T
+        return forces, dual.changes(rates[self.inner], count)
 
     @contextmanager
     def given(self, one: Input, amount: float) -> Iterator[None]:

@@ -11,31 +11,22 @@ step width would fit all.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile import sources
-from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.linear.bench import (
     Bench,
-    acting_wrenches,
     balance,
-    balancing_moment,
     displacement_map,
     set_drives,
     state,
 )
-from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.interface_basis import modes_of
-from flexclear.dynamics.run.evaluation import closure_rows
-from flexclear.dynamics.run.evaluation.tree_factor import bias
 from flexclear.dynamics.specialise import dual
+from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.system.errors import SolverError
 
 #: relative singular values of the closure rows below which rows are redundant
@@ -50,7 +41,7 @@ class Tangent:
 
     q: positions.  Z: speeds per free motion, shape (nv, mobility).  moves: positions per coordinate, (nq, nv).
     bias, mass, multipliers: as in `bench.Balance`; multipliers balance `bias` best.
-    forces: size of the balancing forces (`bench.balancing_moment`).
+    forces: size of the balancing forces (`bench.Balance.moment`).
     """
 
     q: np.ndarray
@@ -74,7 +65,7 @@ class Tangent:
 
 def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     """Return the free motions at closed positions q; raise SolverError at deformations beyond any real pose."""
-    b, forces = balance(bench, q), balancing_moment(bench)
+    b = balance(bench, q)
     try:
         Z, lower, spread = free_motions(b.mass, b.jacobian)
     except np.linalg.LinAlgError:
@@ -85,7 +76,7 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     multipliers = np.linalg.lstsq(spread.T, load, rcond=REDUNDANT_ROW)[0] if len(spread) else np.zeros(0)
     moves = displacement_map(bench, q)
     redundant = len(b.jacobian) - (len(b.bias) - Z.shape[1]) + bench.engine.mobility.redundant
-    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, redundant, forces)
+    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, redundant, b.moment)
 
 
 def free_motions(mass: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -124,14 +115,12 @@ def _forces_by_turning(bench: Bench, at: Tangent) -> float:
     """Return the contribution of the drives' motion to the balancing forces, per speed of the fastest; 0 at rest."""
     if not bench.fastest:
         return 0.0
-    moving, drives = acting_wrenches(bench), bench.drives
+    moving, drives = balance(bench, at.q).acting, bench.drives
     try:
         set_drives(bench, drives * [1.0, 0.0])
-        balance(bench, at.q)
-        resting = acting_wrenches(bench)
+        resting = balance(bench, at.q).acting
     finally:
         set_drives(bench, drives)
-    balance(bench, at.q)  # later code reads the moving state
     return float(np.max(np.abs(moving - resting), initial=0.0)) / bench.fastest
 
 
@@ -151,35 +140,38 @@ def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multiplie
     directions: changes of the state, (directions, NY).  multipliers: constant, (rows,).  Raises SolverError where the
     equations are singular.
     """
-    engine, model, count = bench.engine, bench.model, len(directions)
-    w = changed(bench, q, directions)
-    o = engine.h[m.JACOBIAN]
-    rows = selection.dense_rows(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
-    forces = dual.changes(bias(engine, w), count)
-    return (forces - multipliers @ rows) @ modes_of(model.arrays).T
+    rates = changed(bench, q, directions, multipliers)
+    return dual.changes(rates[bench.model.speeds], len(directions)) @ modes_of(bench.model.arrays).T
 
 
-def changed(bench: Bench, q: np.ndarray, directions: np.ndarray, laws: np.ndarray | None = None) -> np.ndarray:
-    """Return the work space with its changes after an evaluation at rest in positions q.
+def changed(
+    bench: Bench,
+    q: np.ndarray,
+    directions: np.ndarray,
+    multipliers: np.ndarray | None = None,
+    laws: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return the rates of the state at rest in positions q, with their changes; of speeds the forces that hold them, as
+    `mechanics.balance` has them.
 
-    directions: changes of the state, (directions, NY).  laws: of the entries of the table LAW, (directions, entries).
+    directions: changes of the state, (directions, NY).  multipliers: (rows,), zero by default.  laws: changes of the
+    entries of the table LAW, (directions, entries).
     """
-    engine, model = bench.engine, bench.model
+    from flexclear.dynamics.mechanics.balance import balanced  # here: they import the compiler
+    from flexclear.dynamics.mechanics.of_topology import mechanism_of
+    from flexclear.dynamics.mechanics.tables import Tables
+    from flexclear.dynamics.routines.numbers import Numbers
+
+    engine, model, h = bench.engine, bench.model, bench.engine.h
     y = state(bench, q)
-    # stores the laws of time, and all work arrays, in the work space
-    closure_rows.evaluate(engine, y, bench.time)
-    h, w = engine.h.tolist(), list(engine.w)
+    engine.view(m.Y)[:] = y
+    engine.evaluate_laws(bench.time)
+    w, topology = list(engine.w), topology_of(model.arrays, h)
     w[h[m.Y] : h[m.Y] + len(y)] = dual.seeded(y, directions)
     if laws is not None:
         first = h[m.LAW.at]
         w[first : first + laws.shape[1]] = dual.seeded(engine.w[first : first + laws.shape[1]], laws)
-    with np.errstate(all="ignore"):  # as in compiled code, unused values may be infinite
-        _rates(model.parts)(h, list(model.arrays.f), w, engine.n.tolist(), h[m.Y], h[m.SLOPES])
-    return np.array(w, dtype=object)
-
-
-@cache
-def _rates(parts: Parts) -> Callable:
-    scope: dict[str, Any] = {}
-    exec(sources.rates(parts), scope)
-    return dual.plain(scope["rates"])
+    calls = Numbers(h, model.arrays.f, np.array(w, dtype=object), engine.n, int(h[m.Y]), int(h[m.SLOPES]))
+    given = np.zeros(h[m.N_KEPT_ROWS]) if multipliers is None else multipliers
+    balanced(mechanism_of(Tables(model.parts, topology)), list(given), calls)
+    return calls.rates[: len(y)]

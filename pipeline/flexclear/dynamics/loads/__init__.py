@@ -4,7 +4,8 @@ Each module has
 
 - ``row(load, place)`` or, on a joint coordinate, ``row(load, place, coordinate)``: the row of the load (see `row.Row`);
   raises ValueError, in words, for invalid values;
-- ``apply(d, k)``: kernel that applies load k by `fields.act`.
+- ``apply(given)``, and for loads with expressions ``apply(given, formula)``: what the load does (`given`);
+- ``STATES``, if it has internal states: their number.
 """
 
 from __future__ import annotations

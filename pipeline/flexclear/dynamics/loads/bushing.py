@@ -18,117 +18,112 @@ Source: Bauchau (2011), Flexible Multibody Dynamics, sec. 13.3 (rotation vector 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
-from flexclear.dynamics.gauge import internal_rate, relative_twist
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, number
+from flexclear.dynamics.loads.given import Given, Load
 from flexclear.dynamics.loads.row import Row
-from flexclear.dynamics.vectors import (
-    add,
-    at,
-    cross,
-    dot,
-    product,
-    put,
-    scale,
-    sub,
-    to_quaternion,
-    transpose,
-    turn,
-    turn_back,
-)
+from flexclear.dynamics.specialise.symbols import arctan2, branch, cos, larger, sin, sqrt
+from flexclear.dynamics.vectors import Matrix, Vector, Wrench, cross, dot
 from flexclear.scene.loads import Bushing
 
+#: number of its internal states, if any
+STATES = 3
 #: angle^2 below which e comes from its series; the next term is 1e-13 there
 SERIES_BELOW = 1e-3
 #: square of the angle [rad] from which on the torque is undefined; 6.2 of 2 pi
 FULL = 6.2**2
-#: offsets of the damping matrix and of the circulatory one, (K^T - K)/2, among the numbers, and of the blocks of a 6x6
-#: matrix
-DAMPING, CIRCULATION, MIXED, SECOND = 36, 72, 3, 18
 
 
-@kernel
-def rotation_vector(R):
+def apply(given: Given) -> Load:
+    """Return the wrench; power: of the unsymmetric stiffness."""
+    K, C, circulating = (given.numbers[k : k + 36] for k in (0, 36, 72))
+    F, G, before = given.F, given.G, given.states
+    R_FW, r = F.R_WB.T, G.p_WB - F.p_WB
+    slide = G.v - F.v - cross(F.omega, r)
+    x, x_rate, spin = R_FW @ r, R_FW @ slide, R_FW @ (G.omega - F.omega)
+    theta = rotation_vector(R_FW @ G.R_WB)
+    theta = continued(theta, Vector(before)) if before else theta
+    e = tangent_part(theta)
+
+    def turned(v: Vector, half: float) -> Vector:
+        """Return T^-1 v for half = -0.5, T^-T v for 0.5."""
+        swung = cross(theta, v)
+        return v + half * swung + e * cross(theta, swung)
+
+    theta_rate = turned(spin, -0.5)
+    s, s_rate = [*x, *theta], [*x_rate, *theta_rate]
+    elastic, damped = _product(K, s), _product(C, s_rate)
+    along = [-(one + other) for one, other in zip(elastic, damped, strict=True)]
+    wrench = Wrench(F.R_WB @ turned(Vector(along[3:]), 0.5), F.R_WB @ Vector(along[:3]))
+    power, rates = _dot(_product(circulating, s), s_rate), theta_rate if before else ()
+    return Load(wrench, power, _dot(damped, s_rate), rates, stored=0.5 * _dot(elastic, s))
+
+
+def rotation_vector(R: Matrix) -> Vector:
     """Return the shortest rotation vector [rad] of a rotation matrix, from its quaternion."""
-    q = to_quaternion(R)
-    axis = (q[1], q[2], q[3]) if q[0] >= 0.0 else (-q[1], -q[2], -q[3])
-    size, cosine = np.sqrt(dot(axis, axis)), abs(q[0])
-    return scale(2.0 * np.arctan2(size, cosine) / size if size > 0.0 else 2.0 / cosine, axis)
+    w, *axis = to_quaternion(R)
+    axis = branch(w >= 0.0, lambda: Vector(axis), lambda: -Vector(axis))
+    size, cosine = sqrt(dot(axis, axis)), abs(w)
+    return branch(size > 0.0, lambda: 2.0 * arctan2(size, cosine) / size, lambda: 2.0 / cosine) * axis
 
 
-@kernel
-def continued(v, before):
+def to_quaternion(R: Matrix) -> tuple[Any, ...]:
+    """Return a quaternion (w, x, y, z) of a rotation matrix by its largest component, of any norm (Shepperd 1978)."""
+    xx, yy, zz = R[0], R[4], R[8]
+    w, x, y, z = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz
+    wx, wy, wz = R[7] - R[5], R[2] - R[6], R[3] - R[1]
+    xy, yz, zx = R[1] + R[3], R[5] + R[7], R[2] + R[6]
+    most, more = larger(x, larger(y, z)), larger(y, z)
+
+    # four times the products of one component with all four
+    def turned_far() -> Any:
+        return branch(x >= more, lambda: (wx, x, xy, zx), lambda: branch(y >= z, lambda: (wy, xy, y, yz), last))
+
+    def last() -> Any:
+        return wz, zx, yz, z
+
+    return branch(w >= most, lambda: (w, wx, wy, wz), turned_far)
+
+
+def continued(v: Vector, before: Vector) -> Vector:
     """Return that rotation vector below a full turn with the same rotation as v which is closer to `before`."""
-    size = np.sqrt(dot(v, v))
-    if size == 0.0:
-        return v
-    other = scale(1.0 - 2.0 * np.pi / size, v)
-    left, right = sub(v, before), sub(other, before)
-    if dot(left, left) <= dot(right, right):
-        return v
-    beyond = dot(other, other) - FULL
-    # not a number where neither is below a full turn: this ends the run
-    return other if beyond < 0.0 else scale(np.sqrt(-1.0 - beyond), other)
+    size = sqrt(dot(v, v))
+
+    def nearer() -> Vector:
+        other = (1.0 - 2.0 * np.pi / size) * v
+        left, right = v - before, other - before
+        return branch(dot(left, left) <= dot(right, right), lambda: v, lambda: within_a_turn(other))
+
+    return branch(size == 0.0, lambda: v, nearer)
 
 
-@kernel
-def tangent_part(v):
+def within_a_turn(v: Vector) -> Vector:
+    """Return a rotation vector, not a number where it is not below a full turn: this ends the run."""
+    beyond = dot(v, v) - FULL
+    return branch(beyond < 0.0, lambda: v, lambda: sqrt(-1.0 - beyond) * v)
+
+
+def tangent_part(v: Vector) -> Any:
     """Return the factor e of the inverse tangent."""
     s = dot(v, v)
-    if s < SERIES_BELOW:
-        return (1.0 + s / 60.0 * (1.0 + s / 42.0 * (1.0 + s / 40.0))) / 12.0
-    half = 0.5 * np.sqrt(s)
-    return (1.0 - half * np.cos(half) / np.sin(half)) / s
+
+    def closed() -> Any:
+        half = 0.5 * sqrt(s)
+        return (1.0 - half * cos(half) / sin(half)) / s
+
+    return branch(s < SERIES_BELOW, lambda: (1.0 + s / 60.0 * (1.0 + s / 42.0 * (1.0 + s / 40.0))) / 12.0, closed)
 
 
-@kernel
-def times(d, k, first, v):
-    """Return v times a 3x3 block of a matrix of load k, whose first entry is at `first`."""
-    return (
-        number(d, k, first) * v[0] + number(d, k, first + 1) * v[1] + number(d, k, first + 2) * v[2],
-        number(d, k, first + 6) * v[0] + number(d, k, first + 7) * v[1] + number(d, k, first + 8) * v[2],
-        number(d, k, first + 12) * v[0] + number(d, k, first + 13) * v[1] + number(d, k, first + 14) * v[2],
-    )
+def _product(A: Sequence[Any], s: Sequence[Any]) -> list[Any]:
+    """Return a 6x6 matrix times six numbers."""
+    return [_dot(A[k : k + 6], s) for k in range(0, 36, 6)]
 
 
-@kernel
-def product6(d, k, first, x, v):
-    """Return both halves of a 6x6 matrix of load k times (x, v)."""
-    upper = add(times(d, k, first, x), times(d, k, first + MIXED, v))
-    lower = add(times(d, k, first + SECOND, x), times(d, k, first + SECOND + MIXED, v))
-    return upper, lower
-
-
-@kernel
-def apply(d, k):
-    """Apply the force of load k."""
-    load = d.loads[k]
-    a, b = d.site_frames[load.a], d.site_frames[load.b]
-    F, G, p = a.axes, b.axes, b.origin
-    r, (turning, slide) = sub(p, a.origin), relative_twist(a, b)
-    spin = turn_back(F, turning)
-    x, x_rate, v = turn_back(F, r), turn_back(F, slide), rotation_vector(product(transpose(F), G))
-    if load.internal0 >= 0:
-        v = continued(v, at(d.internal, load.internal0))
-    e = tangent_part(v)
-    crossed = cross(v, spin)
-    v_rate = add(spin, add(scale(-0.5, crossed), scale(e, cross(v, crossed))))
-    if load.internal0 >= 0:
-        put(d.ledger_rate, internal_rate(d, load.internal0), v_rate)
-    pull, twist = product6(d, k, 0, x, v)
-    damped_pull, damped_twist = product6(d, k, DAMPING, x_rate, v_rate)
-    stored, lost = 0.5 * (dot(pull, x) + dot(twist, v)), dot(damped_pull, x_rate) + dot(damped_twist, v_rate)
-    circling, swirling = product6(d, k, CIRCULATION, x, v)
-    power = dot(circling, x_rate) + dot(swirling, v_rate)
-    force = turn(F, scale(-1.0, add(pull, damped_pull)))
-    along = scale(-1.0, add(twist, damped_twist))
-    swung = cross(v, along)
-    torque = turn(F, add(along, add(scale(0.5, swung), scale(e, cross(v, swung)))))
-    length = np.sqrt(dot(r, r))
-    rate = dot(r, slide) / length if length > 0.0 else 0.0
-    act(d, k, add(torque, cross(p, force)), force, length, rate, stored, power, lost)
+def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    return sum((x * y for x, y in zip(a, b, strict=True)), 0.0)
 
 
 def row(load: Bushing, path: str) -> Row:
@@ -137,4 +132,4 @@ def row(load: Bushing, path: str) -> Row:
     K, C = np.array(load.stiffness), np.array(load.damping)
     numbers = np.concatenate([K, C, 0.5 * (K.T - K)]).ravel()
     turning = any(np.any(matrix[3:]) or np.any(matrix[:, 3:]) for matrix in (K, C))
-    return Row(frames=load.between, numbers=tuple(numbers.tolist()), states=3 if turning else 0)
+    return Row(frames=load.between, numbers=tuple(numbers.tolist()), states=STATES if turning else 0)

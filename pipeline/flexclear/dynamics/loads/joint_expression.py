@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.loads.fields import along_coordinate
+from flexclear.dynamics.loads.expressions import evaluated
+from flexclear.dynamics.loads.given import Given, Load, pushing
 from flexclear.dynamics.loads.row import Row, by_formula
 from flexclear.scene.formulas import Formula
 from flexclear.scene.loads import JointExpression
 
-#: builds the kernel `apply` from the kernel formula(d, k) of an expression
-applying = along_coordinate
+
+def apply(given: Given, formula: str) -> Load:
+    """Return the force."""
+    (size,), bends = evaluated(given, formula)
+    return pushing(given, size)._replace(bends=bends)
 
 
 def row(load: JointExpression, path: str, formula: Formula, coordinate: Coordinate) -> Row:

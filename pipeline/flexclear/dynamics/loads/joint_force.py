@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import along_coordinate, law
+from flexclear.dynamics.loads.given import Given, Load, pushing
 from flexclear.dynamics.loads.row import Row
 from flexclear.scene.loads import JointForce
 
 
-@kernel
-def given(d, k):
-    """Return the force of load k."""
-    return law(d, k, 0)
-
-
-apply = along_coordinate(given)
+def apply(given: Given) -> Load:
+    """Return the force."""
+    return pushing(given, given.laws[0].value)
 
 
 def row(load: JointForce, path: str, coordinate: Coordinate) -> Row:

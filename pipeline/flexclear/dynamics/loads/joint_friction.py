@@ -10,24 +10,19 @@ from functools import partial
 
 from flexclear.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, measure, number
+from flexclear.dynamics.loads.given import Given, Load
 from flexclear.dynamics.loads.row import Row, numbers
-from flexclear.dynamics.vectors import scale
+from flexclear.dynamics.specialise.symbols import select
 from flexclear.scene.loads import JointFriction
 from flexclear.system.errors import all_or_errors
 
 
-@kernel
-def apply(d, k):
-    """Apply the force of load k."""
-    value, rate, moment, force = measure(d, k)
-    bend, speed = d.load_bends[d.loads[k].bend0], abs(rate)
-    bend.now = rate
-    p = (number(d, k, 1), number(d, k, 2), number(d, k, 3), number(d, k, 4))
-    dry = coefficient(speed, p)
-    size = -number(d, k, 0) * rate - (dry if rate >= 0.0 else -dry)
-    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, 0.0, -size * rate)
+def apply(given: Given) -> Load:
+    """Return the force."""
+    (viscous, *dry), (_, rate, unit) = given.numbers, given.coordinates[0]
+    strength = coefficient(abs(rate), dry)
+    size = -viscous * rate - select(rate >= 0.0, strength, -strength)
+    return Load(unit * size, lost=-size * rate, bends=[rate])
 
 
 def row(load: JointFriction, path: str, coordinate: Coordinate) -> Row:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, measure, number
+from flexclear.dynamics.loads.given import Given, Load
 from flexclear.dynamics.loads.row import Row, numbers
-from flexclear.dynamics.vectors import scale
 from flexclear.scene.loads import JointSpring
 
 
-@kernel
-def apply(d, k):
-    """Apply the force of load k."""
-    value, rate, moment, force = measure(d, k)
-    stretch, damped = value - number(d, k, 2), number(d, k, 1) * rate
-    size = -(number(d, k, 0) * stretch + damped)
-    stored = 0.5 * number(d, k, 0) * stretch * stretch
-    act(d, k, scale(size, moment), scale(size, force), value, rate, stored, 0.0, damped * rate)
+def apply(given: Given) -> Load:
+    """Return the force."""
+    (stiffness, damping, rest), (value, rate, unit) = given.numbers, given.coordinates[0]
+    stretch, damped = value - rest, damping * rate
+    stored = 0.5 * stiffness * stretch * stretch
+    return Load(unit * -(stiffness * stretch + damped), lost=damped * rate, stored=stored)
 
 
 def row(load: JointSpring, path: str, coordinate: Coordinate) -> Row:

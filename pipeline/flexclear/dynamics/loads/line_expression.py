@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, line
+from flexclear.dynamics.loads.expressions import evaluated
+from flexclear.dynamics.loads.given import Given, Load, line
 from flexclear.dynamics.loads.row import Row, by_formula
-from flexclear.dynamics.vectors import cross, scale
+from flexclear.dynamics.vectors import ZERO, Wrench
 from flexclear.scene.formulas import Formula
 from flexclear.scene.loads import LineExpression
 
 
-def applying(formula: Callable) -> Callable:
-    """Build the kernel `apply` of a tension from the kernel formula(d, k) of its expression."""
-
-    @kernel
-    def apply(d, k):
-        length, rate, along = line(d, k)
-        size = formula(d, k)
-        force = scale(-size, along)
-        origin = d.site_frames[d.loads[k].b].origin
-        act(d, k, cross(origin, force), force, length, rate, 0.0, -size * rate, 0.0)
-
-    return apply
+def apply(given: Given, formula: str) -> Load:
+    """Return the tension."""
+    (tension,), bends = evaluated(given, formula)
+    _, rate, direction, _ = line(given)
+    return Load(Wrench(ZERO, -tension * direction), -tension * rate, bends=bends)
 
 
 def row(load: LineExpression, path: str, formula: Formula) -> Row:

@@ -1,4 +1,4 @@
-r"""Tables in expressions of loads: the pieces of a spline, and the kernels that look one up.
+r"""Tables in expressions of loads: the pieces of a spline, and how one is looked up.
 
 The numbers of a table over one quantity with n halvings of its intervals: its upper bound, :math:`2^n` lower bounds of
 intervals, unused ones infinite, and four coefficients of each interval. Over two: both upper bounds, the lower bounds
@@ -8,11 +8,12 @@ Source: de Boor (1978), A Practical Guide to Splines, ch. IV and XVII (tensor pr
 
 from __future__ import annotations
 
-from math import prod
+from math import nan, prod
+from typing import Any
 
 import numpy as np
 
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import Indexed, select, smaller
 from flexclear.scene.tables import LookupTable
 
 #: fraction of a table's range by which rounding may pass its ends
@@ -28,7 +29,7 @@ def length(levels: tuple[int, ...]) -> int:
 
 
 def numbers(table: LookupTable) -> list[float]:
-    """Return the numbers of a table, as the kernels read them."""
+    """Return the numbers of a table, as they are read."""
     axes, sizes = [np.array(axis) for axis in table.axes()], [2**n for n in table.levels()]
     values = np.array(sorted(table.points))[:, -1].reshape([len(axis) for axis in axes])
     # coefficients of the pieces along each quantity in turn, ascending: (interval, power) in place of its values
@@ -54,58 +55,40 @@ def _pieces(x: np.ndarray, y: np.ndarray, between: str) -> np.ndarray:
     return np.stack([y[:-1], slope, 0.0 * slope, 0.0 * slope], axis=1)
 
 
-@kernel
-def onward(d, at, step, x):
-    """Return the step where the number a step further is at most x, else 0."""
-    if d.load_numbers[at + step].value <= x:
-        return step
-    return 0
+def curve(numbers: Indexed, n: int, x: Any) -> Any:
+    """Return the value at x of a table over one quantity with n halvings of its intervals."""
+    i = interval(numbers, 1, n, x)
+    value = cubic(numbers, 1 + (1 << n) + 4 * i, x - numbers[1 + i])
+    return within(numbers, 1, 0, x, value)
 
 
-@kernel
-def interval(d, first, levels, x):
+def surface(numbers: Indexed, n: int, m: int, x: Any, y: Any) -> Any:
+    """Return the value at x and y of a table over two quantities."""
+    along, across = 2, 2 + (1 << n)
+    i, j = interval(numbers, along, n, x), interval(numbers, across, m, y)
+    s, r = x - numbers[along + i], y - numbers[across + j]
+    at = across + (1 << m) + 16 * ((1 << m) * i + j)
+    c0, c1, c2, c3 = (cubic(numbers, at + 4 * k, r) for k in range(4))
+    value = c0 + s * (c1 + s * (c2 + s * c3))
+    return within(numbers, along, 0, x, within(numbers, across, 1, y, value))
+
+
+def interval(numbers: Indexed, first: int, levels: int, x: Any) -> Any:
     """Return the number of the interval that contains x, of those whose lower bounds begin at `first`."""
-    k = 0
-    for level in range(levels):
-        k = k + onward(d, first + k, 1 << (levels - 1 - level), x)
+    k: Any = 0
+    for level in reversed(range(levels)):
+        step = 1 << level
+        k = k + select(numbers[first + k + step] <= x, step, 0)
     return k
 
 
-@kernel
-def within(d, first, upper, x, value):
+def within(numbers: Indexed, first: int, upper: int, x: Any, value: Any) -> Any:
     """Return a value, not a number where x is outside of the table: this ends the run."""
-    low, high = d.load_numbers[first].value, d.load_numbers[upper].value
-    inside = min(x - low, high - x) + ROUNDING * (high - low)
-    if inside < 0.0:
-        return np.sqrt(inside)
-    return value
+    low, high = numbers[first], numbers[upper]
+    return select(smaller(x - low, high - x) + ROUNDING * (high - low) < 0.0, nan, value)
 
 
-@kernel
-def cubic(d, at, s):
+def cubic(numbers: Indexed, at: Any, s: Any) -> Any:
     """Return a cubic whose coefficients begin at `at`."""
-    c0, c1 = d.load_numbers[at].value, d.load_numbers[at + 1].value
-    return c0 + s * (c1 + s * (d.load_numbers[at + 2].value + s * d.load_numbers[at + 3].value))
-
-
-@kernel
-def curve(d, k, first, n, x):
-    """Return the value at x of a table over one quantity, whose numbers begin at the first-th of load k."""
-    upper = d.loads[k].number0 + first
-    bounds = upper + 1
-    i = interval(d, bounds, n, x)
-    value = cubic(d, bounds + (1 << n) + 4 * i, x - d.load_numbers[bounds + i].value)
-    return within(d, bounds, upper, x, value)
-
-
-@kernel
-def surface(d, k, first, n, m, x, y):
-    """Return the value at x and y of a table over two quantities, whose numbers begin at the first-th of load k."""
-    upper = d.loads[k].number0 + first
-    along = upper + 2
-    across = along + (1 << n)
-    i, j = interval(d, along, n, x), interval(d, across, m, y)
-    s, r = x - d.load_numbers[along + i].value, y - d.load_numbers[across + j].value
-    at = across + (1 << m) + 16 * ((1 << m) * i + j)
-    value = cubic(d, at, r) + s * (cubic(d, at + 4, r) + s * (cubic(d, at + 8, r) + s * cubic(d, at + 12, r)))
-    return within(d, along, upper, x, within(d, across, upper + 1, y, value))
+    c0, c1, c2, c3 = (numbers[at + k] for k in range(4))
+    return c0 + s * (c1 + s * (c2 + s * c3))

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexclear.dynamics.gauge import counted, internal_rate
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, law, law_rate, measure, number
+from flexclear.dynamics.loads.given import Given, Load
 from flexclear.dynamics.loads.row import Row, numbers
-from flexclear.dynamics.vectors import scale
+from flexclear.dynamics.specialise.symbols import larger, smaller
 from flexclear.scene.loads import Pid
 from flexclear.scene.units import quantity_at
 
+#: number of its internal states
+STATES = 1
 #: represents a missing limit
 UNLIMITED = 1e300
 #: dimensions of proportional, integral and derivative gain, by (True when the force is a torque, True when the measured
@@ -32,17 +32,14 @@ GAINS = {
 }
 
 
-@kernel
-def apply(d, k):
-    """Apply the force of load k."""
-    value, rate, _, _ = counted(d, d.loads[k].measured)
-    _, speed, moment, force = measure(d, k)
-    state = d.loads[k].internal0
-    error, error_rate = law(d, k, 0) - value, law_rate(d, k, 0) - rate
-    asked = number(d, k, 0) * error + d.internal[state] + number(d, k, 2) * error_rate
-    size = min(max(asked, number(d, k, 3)), number(d, k, 4))
-    d.ledger_rate[internal_rate(d, state)] = number(d, k, 1) * error + number(d, k, 5) * (size - asked)
-    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
+def apply(given: Given) -> Load:
+    """Return the force, within its limits."""
+    proportional, integral, derivative, least, most, tracking = given.numbers
+    (_, speed, unit), (value, rate, _), law = *given.coordinates, given.laws[0]
+    error = law.value - value
+    asked = proportional * error + given.states[0] + derivative * (law.rate - rate)
+    size = smaller(larger(asked, least), most)
+    return Load(unit * size, size * speed, states=[integral * error + tracking * (size - asked)])
 
 
 def settings(load: Any, path: str, coordinate: Coordinate, measured: Coordinate) -> tuple[float, ...]:
@@ -69,4 +66,4 @@ def settings(load: Any, path: str, coordinate: Coordinate, measured: Coordinate)
 def row(load: Pid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
     """Return the load's row: six numbers (`settings`), the reference, and the integral part as state."""
     reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
-    return Row(joint=load.joint, laws=(reference,), numbers=settings(load, path, coordinate, measured), states=1)
+    return Row(joint=load.joint, laws=(reference,), numbers=settings(load, path, coordinate, measured), states=STATES)

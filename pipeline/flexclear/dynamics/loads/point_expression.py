@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from flexclear.dynamics.loads.fields import at_origin
+from flexclear.dynamics.loads.expressions import evaluated
+from flexclear.dynamics.loads.given import Given, Load, pulling
 from flexclear.dynamics.loads.row import Row, by_formula
+from flexclear.dynamics.vectors import Vector
 from flexclear.scene.formulas import Formula
 from flexclear.scene.loads import PointExpression
 
-#: builds the kernel `apply` from the kernel formula(d, k) of three expressions, a vector
-applying = at_origin
+
+def apply(given: Given, formula: str) -> Load:
+    """Return a force by three expressions, or by one that is a vector."""
+    components, bends = evaluated(given, formula)
+    force = given.R_WL @ Vector(components[0] if len(components) == 1 else components)
+    return pulling(given, force, bends=bends)
 
 
 def row(load: PointExpression, path: str, formula: Formula) -> Row:

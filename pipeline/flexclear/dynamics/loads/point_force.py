@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from flexclear.dynamics.loads.fields import at_origin, laws
+from flexclear.dynamics.loads.given import Given, Load, pulling
 from flexclear.dynamics.loads.row import Row
 from flexclear.scene.loads import PointForce
 
-apply = at_origin(laws)
+
+def apply(given: Given) -> Load:
+    """Return the force."""
+    return pulling(given, given.vector)
 
 
 def row(load: PointForce, path: str) -> Row:

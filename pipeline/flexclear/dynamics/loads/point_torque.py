@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, laws
+from flexclear.dynamics.loads.given import Given, Load
 from flexclear.dynamics.loads.row import Row
-from flexclear.dynamics.vectors import ZERO, dot, turn
+from flexclear.dynamics.vectors import ZERO, Wrench, dot
 from flexclear.scene.loads import PointTorque
 
 
-@kernel
-def apply(d, k):
-    """Apply the torque of load k."""
-    frame = d.site_frames[d.loads[k].b]
-    torque = laws(d, k)
-    if d.loads[k].follows:
-        torque = turn(frame.axes, torque)
-    act(d, k, torque, ZERO, 0.0, 0.0, 0.0, dot(torque, frame.omega), 0.0)
+def apply(given: Given) -> Load:
+    """Return the torque."""
+    return Load(Wrench(given.vector, ZERO), dot(given.vector, given.G.omega))
 
 
 def row(load: PointTorque, path: str) -> Row:

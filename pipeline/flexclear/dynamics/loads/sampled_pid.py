@@ -12,33 +12,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.dynamics.gauge import counted
 from flexclear.dynamics.joints.coordinate import Coordinate
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, measure
+from flexclear.dynamics.loads.given import Given, Load, pushing
 from flexclear.dynamics.loads.pid import settings
 from flexclear.dynamics.loads.row import Row
-from flexclear.dynamics.vectors import scale
 from flexclear.scene.loads import SampledPid
 
+#: number of its internal states
+STATES = 3
 #: indices of the internal states
 FORCE, INTEGRAL, ERROR = range(3)
 
 
-@kernel
-def apply(d, k):
-    """Apply the force of load k."""
-    value, rate, _, _ = counted(d, d.loads[k].measured)
-    _, speed, moment, force = measure(d, k)
-    size = d.internal[d.loads[k].internal0]
-    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
+def apply(given: Given) -> Load:
+    """Return the force that is held between samples."""
+    return pushing(given, given.states[FORCE])._replace(states=[0.0] * len(given.states))
 
 
 def row(load: SampledPid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
     """Return the load's row: six numbers (`pid.settings`) and the period [s], the reference, three states."""
     reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
     gains = (*settings(load, path, coordinate, measured), load.period)
-    return Row(joint=load.joint, laws=(reference,), numbers=gains, states=3)
+    return Row(joint=load.joint, laws=(reference,), numbers=gains, states=STATES)
 
 
 def sample(gains: np.ndarray, held: np.ndarray, error: float, *, first: bool) -> np.ndarray:

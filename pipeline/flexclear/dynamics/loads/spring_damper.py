@@ -8,24 +8,18 @@ its limit for :math:`l_0 = 0` and :math:`c = 0`; otherwise a start there is refu
 
 from __future__ import annotations
 
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.loads.fields import act, line, number
+from flexclear.dynamics.loads.given import Given, Load, line
 from flexclear.dynamics.loads.row import Row
-from flexclear.dynamics.vectors import add, cross, scale, sub
+from flexclear.dynamics.vectors import ZERO, Wrench
 from flexclear.scene.loads import SpringDamper
 
 
-@kernel
-def apply(d, k):
-    """Apply the force of load k."""
-    length, rate, along = line(d, k)
-    p = d.site_frames[d.loads[k].b].origin
-    r = sub(p, d.site_frames[d.loads[k].a].origin)
-    stretch, damped = length - number(d, k, 2), number(d, k, 1) * rate
-    # the part -k r, which needs no direction, keeps its slope where the ends coincide
-    force = add(scale(-number(d, k, 0), r), scale(number(d, k, 0) * number(d, k, 2) - damped, along))
-    stored = 0.5 * number(d, k, 0) * stretch * stretch
-    act(d, k, cross(p, force), force, length, rate, stored, 0.0, damped * rate)
+def apply(given: Given) -> Load:
+    """Return the force; its part -k r, which needs no direction, keeps its slope where the ends coincide."""
+    (stiffness, damping, free), (length, rate, direction, r) = given.numbers, line(given)
+    stretch, damped = length - free, damping * rate
+    wrench = Wrench(ZERO, (stiffness * free - damped) * direction - stiffness * r)
+    return Load(wrench, lost=damped * rate, stored=0.5 * stiffness * stretch * stretch)
 
 
 def row(load: SpringDamper, path: str) -> Row:

@@ -9,15 +9,17 @@ from typing import Any
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact.wear import LEDGER
+from flexclear.dynamics.loads import LOADS
+from flexclear.dynamics.loads.given import Law
 from flexclear.dynamics.loads.lookup import length
 from flexclear.dynamics.mechanics.contacts import stop, touch
 from flexclear.dynamics.mechanics.gears import coupling
-from flexclear.dynamics.mechanics.loads import STATES, Law, act
+from flexclear.dynamics.mechanics.loads import act
 from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link, Rubbed, Rubbing
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Site
-from flexclear.dynamics.mechanics.vectors import UNIT, ZERO
 from flexclear.dynamics.routines.calls import MODES, RATES, SCENE, STATE, Cell, Span, cells
+from flexclear.dynamics.vectors import UNIT, ZERO
 
 #: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
 Gauge: Any = namedtuple("Gauge", "turning side axis sine_f sine_g cosine_f cosine_g")
@@ -102,11 +104,10 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
     made = list[Action]()
     for row, name, law, number, look, bend in zip(rows, names, *spans, strict=True):
         kind = tuple(name.split(maxsplit=1))
-        states, rates = _internal(tables, int(row["internal0"]), STATES.get(kind[0], 0))
+        states, rates = _internal(tables, int(row["internal0"]), getattr(LOADS[kind[0]], "STATES", 0))
         reading = _Reading(tables, frames, [frames[row["a"]] if row["a"] >= 0 else world, frames[row["b"]]])
-        for k in (row["gauge"], row["measured"]):
-            if k >= 0:
-                reading.coordinate(k)
+        own = [reading.coordinate(k) for k in (row["gauge"], row["measured"]) if k >= 0]
+        shown = ("coordinate", own[-1]) if own else ("distance" if row["a"] >= 0 else "nothing", 0)
         read = []
         for i, index in enumerate(looks["index"][slice(*look)].tolist()):
             joint = {f"q{i}", f"r{i}"}.intersection(name.split())
@@ -119,9 +120,11 @@ def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
             states,
             reading.gauged,
             read,
+            shown if tables.recorded else (),
         )
-        bends = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
-        made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *bends], int(row["book"])))
+        results = [cell for k in range(*bend) for cell in tables.row(m.NAMED["load_bends"], k)]
+        results += tables.row(m.LOAD, len(made)) if tables.recorded else []
+        made.append(Action(act, given, reading.frames, [*rates, *reading.rates, *results], int(row["book"])))
     return made
 
 
@@ -149,19 +152,22 @@ def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[Any, tuple[Any, .
 def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
     """Return the friction of ideal joints, whose links are marked; carriers: the ground, then all links."""
     table, laws, made = tables.table, tables.parts.kinds("joint_friction"), list[Rubbing]()
-    slot = tables.size(m.SIZES["joint_friction_slot"])
+    slot, count = (tables.size(m.SIZES[name]) for name in ("joint_friction_slot", "n_bearings"))
     for k, row in enumerate(table(m.NAMED["rubbing"])):
         bearings = []
         for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
             one = table(m.NAMED["bearings"])[e]
             what, numbers = Bearing(*(int(one[name]) for name in Bearing._fields)), tables.record("bearing_numbers", e)
             bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
-            bends, load = tables.row(m.NAMED["bends"], e), tables.record("bearing", e).load
-            given = what, laws[one["law"]], numbers, bristle
-            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:]))
+            bends, (load, *rest) = tables.row(m.NAMED["bends"], e), tables.row(m.NAMED["bearing"], e)
+            given, record = (what, laws[one["law"]], numbers, bristle), rest if tables.recorded else []
+            bearings.append(Rubbed(given, [*bends[:3], *rate], load, bends[3:], record))
         link = carriers[row["link"]] if row["link"] >= 0 else None
         if isinstance(link, Link):
-            link.rubbed = True
+            link.watched = True
         joint, second = (frames[row["site_a"]], frames[row["site_b"]]), -1 if row["reversed"] else 1
-        made.append(Rubbing(joint, link, second, int(row["closure"]), bearings, slot + k))
+        reactions = [
+            tables.row(m.NAMED["reactions"], k * (1 + count) + e) for e in range((1 + count) * tables.recorded)
+        ]
+        made.append(Rubbing(joint, link, second, int(row["closure"]), bearings, slot + k, reactions))
     return made

@@ -22,13 +22,13 @@ from collections.abc import Sequence
 from math import inf
 from typing import Any, NamedTuple
 
+from flexclear.dynamics.contact.surfaces.separation import across
 from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
 from flexclear.dynamics.mechanics.contacts import rub
-from flexclear.dynamics.mechanics.surfaces import across
 from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, carried, on_both
-from flexclear.dynamics.mechanics.vectors import ZERO, Matrix, Twist, Vector, Wrench, cross, dot
 from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.routines.symbols import larger, select, sqrt
+from flexclear.dynamics.specialise.symbols import larger, select, sqrt
+from flexclear.dynamics.vectors import ZERO, Matrix, Twist, Vector, Wrench, cross, dot
 
 #: most Newton iterations; change of the loads, as a fraction of the largest, at which they end, and below which they
 #: end when it stops shrinking; strides in which friction is increased where they fail; pivots that count as zero
@@ -68,6 +68,15 @@ def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, 
     else:
         unit = Wrench((numbers.radius * force[1]) * n, force[0] * n)
     return (slip, rate if bristle else ()), on_both((a, b), G, unit), unit, -dot(force, slip), R
+
+
+@routine
+def recorded(slip: Vector, loss: Any, unit: Wrench, b: End) -> tuple[Any]:
+    """Return what the record has of a bearing besides its load (`memory`): all but the sliding speed per normal force.
+
+    slip, loss, unit: see `friction_of`.
+    """
+    return ((sqrt(dot(slip, slip)), loss, unit.about(carried(*b).p_WB)),)
 
 
 @routine

@@ -16,9 +16,9 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from flexclear.dynamics.mechanics.trees import Gains, Motion, Numbers, Site, Step, carried
-from flexclear.dynamics.mechanics.vectors import ZERO, Wrench, cross, dot
 from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.routines.symbols import larger, select, smaller, sqrt
+from flexclear.dynamics.specialise.symbols import larger, select, smaller, sqrt
+from flexclear.dynamics.vectors import ZERO, Twist, Vector, Wrench, cross, dot
 
 #: pivots of J M^-1 J^T below this fraction of their diagonal entry indicate a singular pose
 SINGULAR = 1e-13
@@ -33,6 +33,7 @@ def closure(rows: Sequence[tuple[int, int, int]], kept: int, a: tuple[Motion, Si
     wrenches on the bodies of a and b about the origins of these.
 
     a, b: body and site of the frames of the joint that closes the loop.  rows: see `row`.
+    Source: Wang & Wang (2019), eqs. (30), (31), of prismatic joints and balls.
     """
     A, B = carried(*a), carried(*b)
     made = [row(A, B, *one) for one in rows]
@@ -92,6 +93,30 @@ def less(V: Rows, forces: Numbers, gamma: Numbers, S: Rows) -> tuple[Numbers, Ro
 def inwards(step: Step, wrenches: Wrenches) -> Wrenches:
     """Return wrenches on a body about the origin of the one that carries it."""
     return [wrench.about(step.p_PB) for wrench in wrenches]
+
+
+@routine
+def along(columns: Sequence[Sequence[Twist]], wrenches: Sequence[Wrenches]) -> Rows:
+    """Return the forces along coordinates by their motions, summed over frames: per coordinate one for each row."""
+    both = list(zip(columns, wrenches, strict=True))
+    parts = [[[wrench.on(s) for wrench in on_it] for s in motions] for motions, on_it in both]
+    return [[sum(one, 0.0) for one in zip(*rows, strict=True)] for rows in zip(*parts, strict=True)]
+
+
+@routine
+def transmitted(wrenches: Wrenches, multipliers: Rows, p_WB: Vector, friction: Sequence[Any]) -> tuple[Wrench]:
+    """Return the wrench of a closure on its second body, about the origin of the world.
+
+    wrenches: of its rows there.  multipliers: without friction, by friction.  friction: loads of its bearings, and what
+    these do (`bearings.recorded`).
+    """
+    F = Wrench(ZERO, ZERO)
+    for wrench, *sizes in zip(wrenches, *multipliers, strict=True):
+        F = F + wrench * sum(sizes, 0.0)
+    F = F.about(p_WB)
+    for load, (_, _, *unit) in friction:
+        F = F + Wrench(Vector(unit[:3]), Vector(unit[3:])) * load
+    return (F,)
 
 
 @routine

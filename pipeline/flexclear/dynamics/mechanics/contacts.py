@@ -14,12 +14,13 @@ from typing import Any
 
 from flexclear.dynamics.contact.form import FORMS
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
+from flexclear.dynamics.contact.surfaces import SURFACES
+from flexclear.dynamics.contact.surfaces.separation import across
 from flexclear.dynamics.mechanics.coordinates import along
-from flexclear.dynamics.mechanics.surfaces import SURFACES, across
 from flexclear.dynamics.mechanics.trees import End, Numbers, carried, moving, on_both
-from flexclear.dynamics.mechanics.vectors import ZERO, Vector, Wrench, cross, dot
 from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.routines.symbols import branch, larger, shared, sqrt
+from flexclear.dynamics.specialise.symbols import branch, larger, sqrt
+from flexclear.dynamics.vectors import ZERO, Vector, Wrench, cross, dot
 
 
 def push(form: str, numbers: Any, depth: Any, approach: Any, latched: Any) -> tuple[Any, Any, Any]:
@@ -28,8 +29,8 @@ def push(form: str, numbers: Any, depth: Any, approach: Any, latched: Any) -> tu
     depth: penetration.  latched: the rate at which this contact began.
     """
     law, depth = FORMS[form], larger(0.0, depth)
-    elastic, damping = shared(law.force)(depth, approach, larger(latched, numbers.floor), numbers)
-    return larger(0.0, elastic + damping), damping * approach, shared(law.stored)(depth, numbers)
+    elastic, damping = law.force(depth, approach, larger(latched, numbers.floor), numbers)
+    return larger(0.0, elastic + damping), damping * approach, law.stored(depth, numbers)
 
 
 def rub(law: str, numbers: Numbers, bristle: Numbers, slip: Vector, N: Any) -> tuple[Vector, Any, Any, Vector]:
@@ -37,8 +38,8 @@ def rub(law: str, numbers: Numbers, bristle: Numbers, slip: Vector, N: Any) -> t
     store, and their rate; slip: sliding velocity."""
     if not law:
         return ZERO, 0.0, 0.0, ZERO
-    force, lost, bent, rate = shared(FRICTION_LAWS[law].traction)(bristle or ZERO, slip, N, numbers)
-    return Vector(force), lost, bent, Vector(rate)
+    traction: tuple[Vector, Any, Any, Vector] = FRICTION_LAWS[law].traction(Vector(bristle or ZERO), slip, N, numbers)
+    return traction
 
 
 @routine
@@ -56,10 +57,11 @@ def touch(
 
     laws: form of its normal force, friction law or "".  worn: 1 with wear, else 0.  closed: 1 where the surfaces touch.
     bristle: deflection, in axes of the outer frame, of a law that has some.  ends: of the outer and the inner surface.
+    Source: Wang & Wang (2019), eqs. (23), (24).
     """
     A, B = (carried(*end) for end in ends)
     p = B.p_WB - A.p_WB
-    near = SURFACES[surfaces](numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p))
+    near = SURFACES[surfaces].separation(numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p))
     gap, approach, n, turning, offset = near
     z = across(n, A.R_WB @ Vector(bristle)) if bristle else ZERO
 

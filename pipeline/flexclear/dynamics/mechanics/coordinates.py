@@ -6,8 +6,8 @@ from math import pi
 from typing import Any, NamedTuple
 
 from flexclear.dynamics.mechanics.trees import Motion, Numbers
-from flexclear.dynamics.mechanics.vectors import ZERO, Wrench, cross, dot
-from flexclear.dynamics.routines.symbols import arctan2, nearest
+from flexclear.dynamics.specialise.symbols import arctan2, nearest
+from flexclear.dynamics.vectors import ZERO, Wrench, cross, dot
 
 
 class Along(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from typing import Any, NamedTuple
 
@@ -11,14 +11,13 @@ from flexclear.dynamics.mechanics import bearings as b
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
-from flexclear.dynamics.mechanics.mechanism import Closure, Frame, Link, Mechanism, Modes, Rubbing
-from flexclear.dynamics.mechanics.trees import (
-    Columns,
-    Coordinates,
-)
-from flexclear.dynamics.mechanics.vectors import Wrench
+from flexclear.dynamics.mechanics.loops import Loops, Spread, closed, passed_inwards
+from flexclear.dynamics.mechanics.mechanism import Link, Mechanism, Rubbing
+from flexclear.dynamics.mechanics.modes import Block
+from flexclear.dynamics.mechanics.trees import Coordinates
 from flexclear.dynamics.routines.calls import RESULTS, CallList, Cell, routine
-from flexclear.dynamics.routines.symbols import select
+from flexclear.dynamics.specialise.symbols import select
+from flexclear.dynamics.vectors import Wrench
 
 
 @routine
@@ -36,9 +35,12 @@ def status(reports: t.Numbers, sound: Any, least: Any, jammed: Any) -> tuple[Any
 REPORTS = (m.OK, m.JAMMED, m.SINGULAR, m.NOT_POSITIVE)
 
 
-def evaluated(mechanism: Mechanism, calls: CallList) -> CallList:
+def evaluated(mechanism: Mechanism, calls: CallList) -> Loops:
     """Append the calls that store the rates of the state, and what steps read besides: contacts, bearings and kinks of
-    loads, residuals of the loops, and the independence of their rows."""
+    loads, residuals of the loops, and the independence of their rows. Return the loops.
+
+    Source: Wang & Wang (2019), eqs. (32), (34).
+    """
     with calls.building():
         placed(mechanism)
         supplied = acted(mechanism, calls)
@@ -50,7 +52,7 @@ def evaluated(mechanism: Mechanism, calls: CallList) -> CallList:
         accelerated(mechanism, calls)
         calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_links(mechanism)]))
         calls.store([Cell(RESULTS, 0)], status, [calls.number(one) for one in REPORTS], sound, loops.least, jammed)
-    return calls
+    return loops
 
 
 def placed(mechanism: Mechanism) -> None:
@@ -58,9 +60,8 @@ def placed(mechanism: Mechanism) -> None:
     mechanism.ground.motion = t.ground(mechanism.gravity)
     for link in mechanism.links:
         link.motion, link.step = t.place(link.kind, *link.frame.placed, link.coordinates)
-        if modes := link.modes:
-            given = modes.held, link.motion, link.step, modes.inboard, *modes.moving
-            link.motion, link.step, modes.twists = f.body_of(*given)
+        if link.modes:
+            link.motion, link.step = link.modes.place(link.motion, link.step)
 
 
 def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
@@ -81,22 +82,21 @@ def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
     return powers
 
 
-def eliminated(mechanism: Mechanism) -> Any:
-    """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass."""
+def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
+    """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass.
+
+    slowness: share [s^2] of their stiffness that modes have in their mass.
+    """
     sound: Any = 1.0
     for link in reversed(mechanism.links):
         carried_on = int(link.on_link)
         if modes := link.modes:
-            more: Any = [0.0] * len(modes.q)
-            for station in modes.stations:
-                more = f.bend(more, station, modes.q)
-            need = f.need(modes.places, modes.basis, link.motion, modes.twists, modes.body, modes.q, modes.u, more)
-            modes.gains, modes.forces, link.rest, sound = f.eliminate(need, link.beyond, sound)
-        elif link.driven or link.rubbed:
+            link.rest, sound = modes.eliminate(modes.need(link.motion), link.beyond, sound, slowness)
+        elif link.driven or link.watched:
             link.rest = t.resist(link.motion, link.body, link.beyond)
         if link.driven:
             rest = t.carry(link.step, link.rest) if link.on_link else None
-        elif link.modes or link.rubbed:
+        elif link.modes or link.watched:
             rest, link.gains, link.forces, sound = t.free_joint(carried_on, link.rest, link.bounds, link.step, sound)
         else:
             given = carried_on, link.motion, link.body, link.bounds, link.step, link.beyond, sound
@@ -104,62 +104,6 @@ def eliminated(mechanism: Mechanism) -> Any:
         if rest:
             link.frame.resist(rest)
     return sound
-
-
-class Spread(NamedTuple):
-    """Rows passed from their ends to the ground: V by what they move, and wrenches through joints that are watched."""
-
-    V: dict[Link | Modes, c.Rows]
-    through: dict[Link, c.Wrenches]
-
-
-class Loops(NamedTuple):
-    """Closures that are solved for: their rows passed to the ground, with their wrenches on the second body, and their
-    multipliers; the factor of their matrix, and its smallest pivot."""
-
-    found: dict[int, Spread]
-    on_second: dict[int, c.Wrenches]
-    multipliers: dict[int, t.Numbers]
-    L: c.Blocks
-    least: Any
-
-    def solved(self, right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
-        """Return the multipliers for right-hand sides."""
-        return dict(zip(self.found, c.solved(self.L, right), strict=True))
-
-
-def closed(mechanism: Mechanism, calls: CallList) -> Loops:
-    """Add the closures' forces to those of all links."""
-    found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Modes, list[int]]()
-    numbers, on_second = list[int](), dict[int, c.Wrenches]()
-    for number, one in enumerate(mechanism.closures):
-        kept, ends = len(one.scales), (frame.placed for frame in one.frames)
-        gamma, *wrenches = calls.store(one.results, one.routine, *one.given, kept, *ends)
-        if not kept:
-            continue
-        i = len(found)
-        mine, gamma, S[i, i] = passed_inwards(list(zip(one.frames, wrenches, strict=True)), gamma)
-        for moved, V in mine.V.items():
-            for k in moved_by.setdefault(moved, []):
-                before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
-                S[i, k] = c.coupled(before, V, found[k].V[moved])
-            moved_by[moved].append(i)
-        found.append(mine)
-        right.append(gamma)
-        numbers.append(number)
-        on_second[number] = wrenches[1]
-    if not mechanism.closures:
-        return Loops({}, {}, {}, {}, 1.0)
-    L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
-    calls.write([mechanism.least_pivot], [least])
-    multipliers = dict(zip(numbers, c.solved(L, right), strict=True))
-    loops = Loops(dict(zip(numbers, found, strict=True)), on_second, multipliers, L, least)
-    for number, mine in loops.found.items():
-        for moved, V in mine.V.items():
-            moved.forces = c.with_multipliers(moved.forces, V, multipliers[number])
-        for link, on_it in mine.through.items():
-            link.closing.append((on_it, multipliers[number]))
-    return loops
 
 
 def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
@@ -172,14 +116,9 @@ def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
             if calls:
                 link.acceleration = calls.store(link.rates, t.accelerate, link.kind, link.coordinates, *given)
             else:
-                _, link.acceleration = t.accelerate("fixed", Coordinates((), (), ()), *given)
-        if modes := link.modes:
-            on_shapes = modes.gains, modes.forces, link.acceleration
-            if calls:
-                to_modes = modes.basis, modes.body.T, modes.u
-                modes.accelerations = calls.store(modes.rates, f.accelerate, *to_modes, *on_shapes)
-            else:
-                _, modes.accelerations = f.accelerate((), (), (), *on_shapes)
+                link.changes, link.acceleration = t.accelerate("fixed", Coordinates((), (), ()), *given)
+        if link.modes:
+            link.modes.accelerate(link.acceleration, calls)
 
 
 # Friction of ideal joints ---------------------------------------------------------------------------------------------
@@ -187,7 +126,7 @@ class Influence(NamedTuple):
     """What a bearing does per normal force: L^-1 of its forces by what they move; wrenches on links that are watched,
     and the multipliers of closures; its wrench on the second body at the joint's frame."""
 
-    forces: dict[Link | Modes, t.Numbers]
+    forces: dict[Link | Block, t.Numbers]
     through: dict[Link, Wrench]
     multipliers: dict[int, t.Numbers]
     unit: Wrench
@@ -201,6 +140,8 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
         ends, wrenches, units = [frame.placed for frame in joint.frames], list[Any](), list[Wrench]()
         for one in joint.bearings:
             on_both, unit, loss, R_WB = calls.store(one.sliding, b.friction_of, *one.given, *ends)
+            if one.record:
+                calls.store(one.record, b.recorded, one.sliding[:3], loss, unit, ends[1])
             wrenches.append(on_both)
             units.append(unit)
             losses.append(loss)
@@ -213,6 +154,9 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
     places = [one for joint in mechanism.rubbing for one in joint.bearings]
     loads, bends = [one.load for one in places], [cell for one in places for cell in one.bends]
     reactions = reactions_of(mechanism, loops, list(zip(influences, of_bearing, strict=True)))
+    for joint, smooth, parts in zip(of_bearing, *reactions, strict=True):
+        for row, wrench in zip(joint.reactions, (smooth, *parts), strict=False):
+            calls.write(row, wrench)
     found, kinks, jammed = loads_of(bearings, *reactions, calls)
     calls.write([*loads, *bends], [*found, *kinks])
 
@@ -221,12 +165,12 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
         moved.forces = c.with_multipliers(moved.forces, list(zip(*V, strict=True)), loads)
     for number, mine in loops.found.items():
         rows = list(zip(*(by.multipliers[number] for by in influences), strict=True))
-        more = c.with_multipliers([0.0] * len(rows), rows, loads)
+        more = loops.by_friction[number] = c.with_multipliers([0.0] * len(rows), rows, loads)
         for link, on_it in mine.through.items():
             link.closing.append((on_it, more))
-    for by, load in zip(influences, loads, strict=True):
+    for by, joint, load in zip(influences, of_bearing, loads, strict=True):
         for link, wrench in by.through.items():
-            link.closing.append(([wrench], [load]))
+            (link.own if link is joint.link else link.closing).append(([wrench], [load]))
     powers = [b.lost(*one) for one in zip(loads, losses, strict=True)]
     return [(joint.book, power) for joint, power in zip(of_bearing, powers, strict=True)], jammed
 
@@ -259,26 +203,39 @@ def loads_of(
     return loads, [bend for _, bends, _ in pressed(loads, 1.0) for bend in bends], jammed
 
 
-def moving(mechanism: Mechanism) -> list[Link | Modes]:
+def moving(mechanism: Mechanism) -> list[Link | Block]:
     """Return all that forces move."""
-    return [moved for link in mechanism.links for moved in (link, link.modes) if moved]
+    return [moved for link in mechanism.links for moved in (link, *(link.modes.blocks if link.modes else ()))]
 
 
 def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
     """Return what bearing k of a joint does per normal force, while all loops stay closed."""
-    forces: dict[Link | Modes, t.Numbers] = {moved: [row[k] for row in V] for moved, V in spread.V.items()}
+    forces: dict[Link | Block, t.Numbers] = {moved: [row[k] for row in V] for moved, V in spread.V.items()}
     right = list[Any]()
     for number, one in loops.found.items():
-        rows: c.Rows = [[0.0]] * len(loops.multipliers[number])
+        rows: c.Rows = [[0.0]] * len(loops.ends[number][0][1])
         for moved, V in one.V.items():
             if moved in forces:
                 rows = c.coupled(rows, V, [[force] for force in forces[moved]])
         right.append(c.opposite([row[0] for row in rows]))
+    multipliers = answered(loops, forces, right)
+    return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
+
+
+def answered(loops: Loops, forces: dict[Link | Block, t.Numbers], right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
+    """Return the multipliers for right-hand sides, and add their part to forces."""
     multipliers = loops.solved(right)
     for number, one in loops.found.items():
         for moved, V in one.V.items():
             forces[moved] = c.with_multipliers(forces.get(moved, [0.0] * len(V)), V, multipliers[number])
-    return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
+    return multipliers
+
+
+def respond(mechanism: Mechanism, forces: Mapping[Link | Block, t.Numbers]) -> None:
+    """Compute the accelerations by forces, given as L^-1 of them, alone."""
+    for moved in moving(mechanism):
+        moved.forces = forces.get(moved, [0.0] * len(moved.forces))
+    accelerated(mechanism)
 
 
 def reactions_of(
@@ -289,9 +246,7 @@ def reactions_of(
     accelerated(mechanism)
     smooth, parts = [reaction(loops, joint) for joint in joints], list[list[Wrench]]()
     for by, of_joint in influences:
-        for moved, forces in without.items():
-            moved.forces = by.forces.get(moved, [0.0] * len(forces))
-        accelerated(mechanism)
+        respond(mechanism, by.forces)
         parts.append([reaction(loops, joint, by, own=joint is of_joint) for joint in joints])
     for moved, forces in without.items():
         moved.forces = forces
@@ -304,7 +259,8 @@ def reaction(loops: Loops, joint: Rubbing, by: Influence | None = None, *, own: 
     bearing alone; own: True for a bearing of the joint itself."""
     second, link, multipliers = joint.frames[1].placed, joint.link, (by or loops).multipliers
     if link is None:
-        rows = loops.on_second.get(joint.closure, []), multipliers.get(joint.closure, [])
+        on_second = loops.ends[joint.closure][1][1] if joint.closure in loops.found else []
+        rows = on_second, multipliers.get(joint.closure, [])
         return b.reaction_in_loop(*rows, [by.unit] if by and own else [], second)
     passing = [(one.through[link], multipliers[number]) for number, one in loops.found.items() if link in one.through]
     if by and not own and link in by.through:
@@ -313,57 +269,12 @@ def reaction(loops: Loops, joint: Rubbing, by: Influence | None = None, *, own: 
     return b.reaction_in_tree(joint.second, link.rest, link.acceleration, known, passing, link.motion, second)
 
 
-def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tuple[c.Blocks, Any]:
-    """Return the factor of J M^-1 J^T, lower blocks by two closures, and its smallest pivot; store its diagonals."""
-    rest, L, least = dict(S), c.Blocks(), 1.0
-    for j, one in enumerate(closures):
-        given = rest[j, j], [row[i] for i, row in enumerate(S[j, j])], one.scales, least
-        L[j, j], least = calls.store([*one.diagonal, *one.roots], c.cholesky, *given)
-        column = [i for i in range(j + 1, len(closures)) if (i, j) in rest]
-        for at, i in enumerate(column):
-            L[i, j] = c.below(rest[i, j], L[j, j])
-            for k in column[: at + 1]:
-                before = rest.get((i, k)) or [[0.0] * len(L[k, j])] * len(L[i, j])
-                rest[i, k] = c.eliminated(before, L[i, j], L[k, j])
-    return L, least
-
-
-def passed_inwards(ends: Sequence[tuple[Frame, c.Wrenches]], gamma: t.Numbers) -> tuple[Spread, t.Numbers, c.Rows]:
-    """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; ends: frames and wrenches on them."""
-    found, waiting, loads = Spread({}, {}), dict[Link, c.Wrenches](), dict[Link, list[tuple[c.Wrenches, Columns]]]()
-    S: c.Rows = [[0.0] * (i + 1) for i in range(len(gamma))]
-
-    def receive(frame: Frame, wrenches: c.Wrenches) -> None:
-        link = frame.carrier
-        if isinstance(link, Link):
-            waiting[link] = c.together(waiting[link], wrenches) if link in waiting else wrenches
-            loads.setdefault(link, []).append((wrenches, frame.deformed[1]))
-
-    for frame, wrenches in ends:
-        receive(frame, wrenches)
-    while waiting:
-        link = max(waiting, key=lambda link: link.depth)
-        wrenches, carried_on = waiting.pop(link), int(link.on_link)
-        if modes := link.modes:
-            modal = modes.gains, modes.forces, loads[link], wrenches, gamma, S
-            found.V[modes], gamma, S, wrenches = f.spread(*modal)
-        if link.driven or link.rubbed:
-            found.through[link] = wrenches
-        if link.gains:
-            given = carried_on, link.step, link.gains, link.forces, wrenches, gamma, S
-            found.V[link], gamma, S, passed = c.spread(*given)
-        else:
-            passed = c.inwards(link.step, wrenches) if carried_on else []
-        receive(link.frame, passed)
-    return found, gamma, S
-
-
 def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
     """Return the powers of drives, and those lost to damping of modes, by their books."""
     powers = list[tuple[int, Any]]()
     for link in mechanism.links:
         if link.driven:
-            given = link.step, link.rest, link.acceleration, link.closing, link.coordinates.u
+            given = link.step, link.rest, link.acceleration, [*link.closing, *link.own], link.coordinates.u
             powers.append((link.book, t.driving_power(*given)))
         if modes := link.modes:
             powers.append((modes.book, f.damping_power(modes.body.damping, modes.u)))

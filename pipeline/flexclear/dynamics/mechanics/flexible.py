@@ -25,22 +25,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
-from flexclear.dynamics.mechanics import closures as c
-from flexclear.dynamics.mechanics.closures import Rows, Wrenches, backward, forward
-from flexclear.dynamics.mechanics.joints import rotation, series
+from flexclear.dynamics.joints.rotation_vector import rotation, series
+from flexclear.dynamics.mechanics.closures import Rows, Wrenches
 from flexclear.dynamics.mechanics.trees import (
-    MASSLESS,
-    Beyond,
     Columns,
     Motion,
     Numbers,
-    Resistance,
     Site,
     Step,
     carrying,
 )
-from flexclear.dynamics.mechanics.vectors import (
-    AT_REST,
+from flexclear.dynamics.routines.calls import routine
+from flexclear.dynamics.vectors import (
     ZERO,
     Inertia,
     Matrix,
@@ -51,12 +47,10 @@ from flexclear.dynamics.mechanics.vectors import (
     cross,
     dot,
     skew,
-    total,
 )
-from flexclear.dynamics.routines.calls import routine
-from flexclear.dynamics.routines.symbols import cos, select, sin
 
 Places = Sequence[tuple[int, ...]]
+Vectors = Sequence[Vector]
 
 
 class Shapes(NamedTuple):
@@ -97,53 +91,79 @@ class Modal(NamedTuple):
     mass_of_shapes: Rows
 
 
-class Station(NamedTuple):
-    """A section of a rod: rotation and curvature per mode, a row per axis; stiffness of twist and bending."""
-
-    rotation: Rows
-    curvature: Rows
-    stiffness: Symmetric
-
-
 class Need(NamedTuple):
     """What a body needs alone: inertia I and wrench F of its known motion; the same of its shapes: per unit of their
-    accelerations wrenches P and forces m (rows up to the diagonal), and forces of the known motion."""
+    accelerations wrenches P and forces m (rows up to the diagonal), and forces of the known motion.
+
+    sums: over its modes.
+    """
 
     I: Inertia
     F: Wrench
     P: Wrenches
-    m: Rows
+    m: Any
     forces: Numbers
+    sums: Any = ()
 
 
-class Gains(NamedTuple):
-    """Of the shapes' rows of the factor of the mass matrix."""
+class Known(NamedTuple):
+    """Known motion of a body, in its axes."""
 
-    L: Rows
-    K: Wrenches
+    R_WB: Matrix
+    omega: Vector
+    alpha: Vector
+    a: Vector
+
+
+class Share(NamedTuple):
+    """Of some modes: E, nine rows, what the moments add to these by the coordinates (P = E + bent) and by the rates
+    (bending), and V."""
+
+    E: Rows
+    bent: Rows
+    bending: Rows
+    V: Rows
 
 
 # Displacements --------------------------------------------------------------------------------------------------------
 class Displacement(NamedTuple):
-    """A displacement by modes, its rate, its second rate without modal accelerations, and its derivatives by modes."""
+    """A displacement by modes, its rate, and its second rate without modal accelerations."""
 
-    by: Vector
-    rate: Vector
-    bias: Vector
-    slopes: Sequence[Vector]
-
-
-def displacement(shapes: Shapes, q: Numbers, u: Numbers) -> Displacement:
-    """Return a displacement at modal coordinates and rates."""
-    bent, bending = (curved(shapes.second, by) for by in (q, u))
-    slopes = [s + g for s, g in zip(by_mode(shapes.linear), bent, strict=True)]
-    halfway = [s + 0.5 * g for s, g in zip(by_mode(shapes.linear), bent, strict=True)]
-    return Displacement(weighted(halfway, q), weighted(slopes, u), weighted(bending, u), slopes)
+    by: Vector = ZERO
+    rate: Vector = ZERO
+    bias: Vector = ZERO
 
 
+class Sums(NamedTuple):
+    """Sums over modes: displacement of the first moment; int rho r r^T, of which only the symmetric part counts;
+    D = int rho r r'^T; and int rho r (q'^T G q')^T."""
+
+    moved: Displacement
+    Q: Numbers
+    D: Matrix
+    drift: Matrix
+
+
+@routine
+def displaced(
+    before: Displacement, linear: Rows, bent: Vectors, bending: Vectors, q: Numbers, u: Numbers
+) -> tuple[Displacement, list[Vector]]:
+    """Add the displacement by some modes, and return its derivatives by them; bent, bending: their G q and G u."""
+    both = list(zip(by_mode(linear), bent, strict=True))
+    slopes, halfway = ([s + share * g for s, g in both] for share in (1.0, 0.5))
+    sums = (halfway, q, before.by), (slopes, u, before.rate), (bending, u, before.bias)
+    return Displacement(*(weighted(*one) for one in sums)), slopes
+
+
+def displacement(shapes: Shapes, q: Numbers, u: Numbers) -> tuple[Displacement, list[Vector]]:
+    """Return a displacement at modal coordinates and rates, and its derivatives by modes."""
+    return displaced(Displacement(), shapes.linear, *(curved(shapes.second, by) for by in (q, u)), q, u)
+
+
+@routine
 def curved(second: Sequence[Rows], q: Numbers) -> list[Vector]:
     """Return G q, a vector per mode."""
-    return by_mode([[_dot(row, q) for row in form] for form in second]) if second else [ZERO] * len(q)
+    return by_mode([[scalar(row, q) for row in form] for form in second]) if second else [ZERO] * len(q)
 
 
 def by_mode(rows: Iterable[Numbers]) -> list[Vector]:
@@ -156,7 +176,8 @@ def weighted(vectors: Iterable[Any], factors: Iterable[Any], start: Any = ZERO) 
     return sum((factor * vector for vector, factor in zip(vectors, factors, strict=True)), start)
 
 
-def _dot(a: Iterable[Any], b: Iterable[Any]) -> Any:
+def scalar(a: Iterable[Any], b: Iterable[Any]) -> Any:
+    """Return the sum of products."""
     return weighted(a, b, 0.0)
 
 
@@ -171,6 +192,7 @@ def moving(basis: Places, T: Numbers, held: int, q: Numbers) -> list[Any]:
     return p
 
 
+@routine
 def in_shapes(basis: Places, T: Numbers, values: Sequence[Any], nothing: Any = 0.0) -> list[Any]:
     """Return T^T values: forces on shapes from those on modes."""
     out = [nothing] * len(values)
@@ -179,41 +201,70 @@ def in_shapes(basis: Places, T: Numbers, values: Sequence[Any], nothing: Any = 0
     return out
 
 
+@routine
+def in_modes(basis: Places, T: Numbers, values: Sequence[Any]) -> list[Any]:
+    """Return T values: rates of modes from those of shapes."""
+    return in_shapes([(shape, mode) for mode, shape in basis], T, values)
+
+
 # Frames ---------------------------------------------------------------------------------------------------------------
-def deformed(held: int, port: Port | Site, p: Numbers, rates: Numbers) -> tuple[Site, Columns]:
-    """Return the site of a port on the deformed body, and its motion there per rate of each shape, in axes of B."""
-    if isinstance(port, Site):  # no shape moves it
-        return port, [AT_REST] * (held + len(p))
-    moved, turned = (displacement(shapes, p, rates) for shapes in (port.moves, port.turns))
+@routine
+def deformed(port: Port, moved: Displacement, turned: Displacement) -> tuple[Site, Matrix]:
+    """Return the site of a port on the deformed body, and T, which maps rates of its rotation vector to turning."""
     R, T, bias = rotation(turned.by, turned.rate, series(dot(turned.by, turned.by)))
     velocity, acceleration = Twist(T @ turned.rate, moved.rate), Twist(bias + T @ turned.bias, moved.bias)
-    columns = [Twist(T @ psi, phi) for psi, phi in zip(turned.slopes, moved.slopes, strict=True)]
-    return Site(port.p_BS + moved.by, R @ port.R_BS, velocity, acceleration), [AT_REST] * held + columns
+    return Site(port.p_BS + moved.by, R @ port.R_BS, velocity, acceleration), T
 
 
 @routine
-def at_port(held: int, motion: Motion, twists: Columns, port: Port, p: Numbers, rates: Numbers) -> Any:
-    """Return the site of a port on the deformed body, and its motion per rate of each shape, about the origin of B.
+def columns_at(motion: Motion, twists: Columns, site: Site, T: Matrix, moves: Vectors, turns: Vectors) -> list[Twist]:
+    """Return the motion of a port about the origin of its body per rate of some shapes.
 
-    twists: of the body frame per rate of each shape.  p, rates: of moving shapes.
+    twists: of the body frame per rate of each shape.  moves, turns: derivatives of the port's displacement and rotation
+    vector by those shapes that move it, which are the last ones.
     """
-    site, columns = deformed(held, port, p, rates)
     R, arm = motion.R_WB, motion.R_WB @ site.p_BS
-    return site, [twist + column.seen(R).at(-arm) for twist, column in zip(twists, columns, strict=True)]
+    columns = [Twist(T @ psi, phi).seen(R).at(-arm) for phi, psi in zip(moves, turns, strict=True)]
+    held = len(twists) - len(columns)
+    return [*twists[:held], *(twist + column for twist, column in zip(twists[held:], columns, strict=True))]
 
 
 @routine
-def body_of(held: int, joint: Motion, step: Step, port: Port | Site, p: Numbers, rates: Numbers) -> Any:
-    """Return the motion of a body from that of its joint's frame, which shapes may move in the body; the step to the
-    body; and the twist of the body per rate of each shape."""
-    site, columns = deformed(held, port, p, rates)
+def at_port(motion: Motion, twists: Columns, port: Port, p: Numbers, rates: Numbers) -> tuple[Site, Columns]:
+    """Return the site of a port on the deformed body, and its motion per rate of each shape (`columns_at`).
+
+    p, rates: of moving shapes.  Source: Wang & Wang (2019), eqs. (2), (7), (8).
+    """
+    (moved, moves), (turned, turns) = (displacement(shapes, p, rates) for shapes in (port.moves, port.turns))
+    site, T = deformed(port, moved, turned)
+    return site, columns_at(motion, twists, site, T, moves, turns)
+
+
+@routine
+def placed(joint: Motion, step: Step, site: Site) -> tuple[Motion, Step]:
+    """Return the motion of a body from that of its joint's frame, which is a site on it, and the step to the body."""
     body = carrying(joint, site)
     arm = body.R_WB @ site.p_BS
-    step = Step([s.at(-arm) for s in step.S], step.p_PB - arm)
-    return body, step, [column.seen(body.R_WB).at(-arm) * -1.0 for column in columns]
+    return body, Step([s.at(-arm) for s in step.S], step.p_PB - arm)
 
 
-# Elimination ----------------------------------------------------------------------------------------------------------
+@routine
+def opposite(twists: Columns) -> list[Twist]:
+    """Return the opposite of twists: of a body frame, by the shapes that move the frame of its joint in the body."""
+    return [twist * -1.0 for twist in twists]
+
+
+@routine
+def body_of(joint: Motion, step: Step, port: Port, p: Numbers, rates: Numbers, still: Columns) -> Any:
+    """Return the motion of a body from that of its joint's frame, which shapes may move in the body; the step to the
+    body; and the twist of the body per rate of each shape. still: per shape a twist that is zero."""
+    (moved, moves), (turned, turns) = (displacement(shapes, p, rates) for shapes in (port.moves, port.turns))
+    site, T = deformed(port, moved, turned)
+    body, step = placed(joint, step, site)
+    return body, step, opposite(columns_at(body, still, site, T, moves, turns))
+
+
+# Inertia --------------------------------------------------------------------------------------------------------------
 @routine
 def need(
     places: Places, basis: Places, motion: Motion, twists: Columns, body: Modal, q: Numbers, u: Numbers, more: Numbers
@@ -223,40 +274,105 @@ def need(
     places: of the moments: row 3k + l, mode of q, mode.  basis: mode and shape of the entries of T.  more: further
     forces that the modes need, of the elastic energy.
     """
-    n, R = len(q), motion.R_WB
-    P, V, bent = [list(row) for row in body.E], *([[0.0] * n for _ in range(9)] for _ in range(2))
+    bent, bending, V = ([[0.0] * len(q) for _ in range(9)] for _ in range(3))
     for (row, i, j), (position, rate) in zip(places, body.moments, strict=True):
-        P[row][j] = P[row][j] + position * q[i]
+        bent[row][j] = bent[row][j] + position * q[i]
+        bending[row][j] = bending[row][j] + position * u[i]
         V[row][j] = V[row][j] + rate * u[i]
-        bent[row][j] = bent[row][j] + position * u[i]
-    Q = [body.second[r] + _dot(body.E[3 * (r % 3) + r // 3], q) + _dot(P[r], q) for r in range(9)]
-    D, drift = (Matrix([_dot(row, u) for row in rows]) for rows in (P, bent))
-    J, spins = tensor(Q), [axial(column) for column in zip(*P, strict=True)]
-    moved = displacement(body.moves, q, u)
+    share, curves = Share(body.E, bent, bending, V), [curved(body.moves.second, by) for by in (q, u)]
+    sums, slopes = summed(nothing(body.second), share, body.moves.linear, *curves, q, u)
+    known, I, F = whole(motion, body.mass, body.first, body.untilted, sums)
+    forces, spins = on_modes(known, share, slopes, body.stiffness, body.damping, q, u, more)
+    forces, spins = in_shapes(basis, body.T, forces), in_shapes(basis, body.T, spins, ZERO)
+    alone, P, forces = momenta(motion.R_WB, I, F, spins, body.moved, curves[0], twists, forces)
+    return Need(I, F, P, coupled(body.mass_of_shapes, alone, P, twists, twists), forces, sums)
 
+
+def nothing(second: Numbers) -> Sums:
+    """Return the sums over no modes; second: int rho X X^T."""
+    return Sums(Displacement(), second, *[Matrix([0.0] * 9)] * 2)
+
+
+@routine
+def summed(
+    before: Sums, share: Share, linear: Rows, bent: Vectors, bending: Vectors, q: Numbers, u: Numbers
+) -> tuple[Sums, list[Vector]]:
+    """Add the parts of some modes to sums, and return the derivatives of the first moment by these modes.
+
+    The arguments are those of `displaced`, of the first moment.
+    """
+    (moved, slopes), (P, E) = displaced(before.moved, linear, bent, bending, q, u), (momenta_of(share), share.E)
+    Q = [before.Q[r] + scalar(E[3 * (r % 3) + r // 3], q) + scalar(P[r], q) for r in range(9)]
+    both = (before.D, P), (before.drift, share.bending)
+    D, drift = (Matrix([one + scalar(row, u) for one, row in zip(old, rows, strict=True)]) for old, rows in both)
+    return Sums(moved, Q, D, drift), slopes
+
+
+def momenta_of(share: Share) -> list[list[Any]]:
+    """Return P, nine rows."""
+    return [[e + more for e, more in zip(*rows, strict=True)] for rows in zip(share.E, share.bent, strict=True)]
+
+
+@routine
+def whole(motion: Motion, mass: Any, first: Vector, untilted: Symmetric, sums: Sums) -> tuple[Known, Inertia, Wrench]:
+    """Return the motion of a body in its axes, its inertia, and the wrench that the motion needs.
+
+    Source: Wang & Wang (2019), eqs. (9), (14), (15).
+    """
+    R, D, J, moved = motion.R_WB, sums.D, tensor(sums.Q), sums.moved
     omega, alpha, a = (R.T @ v for v in (motion.omega, motion.alpha, motion.a))
-    c, v = body.first + moved.by, moved.rate
-    force = body.mass * a + cross(alpha, c) + cross(omega, cross(omega, c) + 2.0 * v) + moved.bias
-    moment = cross(c, a) + J @ alpha + cross(omega, J @ omega - body.untilted @ omega) + axial(drift)
+    c, v = first + moved.by, moved.rate
+    force = mass * a + cross(alpha, c) + cross(omega, cross(omega, c) + 2.0 * v) + moved.bias
+    moment = cross(c, a) + J @ alpha + cross(omega, J @ omega - untilted @ omega) + axial(sums.drift)
     moment = moment + 2.0 * ((D[0] + D[4] + D[8]) * omega - D.T @ omega)
-    F, turning = Wrench(R @ moment, R @ force), skew(omega) @ skew(omega)
-    forces = [
-        dot(moved.slopes[j], a) + dot(spins[j], alpha) + _dot(turning, [row[j] for row in P])
-        + 2.0 * dot(axial([row[j] for row in V]), omega) + body.stiffness[j] * q[j] + body.damping[j] * u[j] + more[j]
-        for j in range(n)
-    ]  # fmt: skip
+    I = Inertia((R @ J @ R.T).symmetric, skew(R @ c), Symmetric([mass] * 3 + [0.0] * 3))
+    return Known(R, omega, alpha, a), I, Wrench(R @ moment, R @ force)
 
-    I = Inertia((R @ J @ R.T).symmetric, skew(R @ c), Symmetric([body.mass] * 3 + [0.0] * 3))
-    spins = in_shapes(basis, body.T, spins, ZERO)
-    slopes = [s + g for s, g in zip(by_mode(body.moved), curved(body.moves.second, q), strict=True)]
+
+@routine
+def on_modes(
+    known: Known, share: Share, slopes: Vectors, stiffness: Numbers, damping: Numbers, q: Numbers, u: Numbers,
+    more: Numbers,
+) -> tuple[list[Any], list[Vector]]:  # fmt: skip
+    """Return the forces that some modes need in the known motion, and int rho r x S of each.
+
+    Source: Wang & Wang (2019), eqs. (9), (14), (15).
+    """
+    P, turning = momenta_of(share), skew(known.omega) @ skew(known.omega)
+    spins = [axial(column) for column in zip(*P, strict=True)]
+    forces = [
+        dot(slopes[j], known.a) + dot(spins[j], known.alpha) + scalar(turning, [row[j] for row in P])
+        + 2.0 * dot(axial([row[j] for row in share.V]), known.omega) + stiffness[j] * q[j] + damping[j] * u[j] + more[j]
+        for j in range(len(q))
+    ]  # fmt: skip
+    return forces, spins
+
+
+@routine
+def momenta(
+    R: Matrix, I: Inertia, F: Wrench, spins: Vectors, moved: Rows, bent: Vectors, twists: Columns, forces: Numbers
+) -> tuple[Wrenches, Wrenches, list[Any]]:
+    """Return the momenta per rate of some shapes, alone and with the body that they move, and the forces on them.
+
+    forces: without those of F.
+    """
+    slopes = [s + g for s, g in zip(by_mode(moved), bent, strict=True)]
     alone = [Wrench(R @ spin, R @ slope) for spin, slope in zip(spins, slopes, strict=True)]
-    moving = [momentum + I.of(twist) for momentum, twist in zip(alone, twists, strict=True)]
-    m = [
-        [body.mass_of_shapes[i][j] + alone[i].on(twists[j]) + moving[j].on(twists[i]) for j in range(i + 1)]
-        for i in range(n)
-    ]
-    forces = [one + F.on(twist) for one, twist in zip(in_shapes(basis, body.T, forces), twists, strict=True)]
-    return Need(I, F, moving, m, forces)
+    both = [momentum + I.of(twist) for momentum, twist in zip(alone, twists, strict=True)]
+    return alone, both, [one + F.on(twist) for one, twist in zip(forces, twists, strict=True)]
+
+
+@routine
+def coupled(mass: Rows, alone: Wrenches, momenta: Wrenches, twists: Columns, others: Columns) -> list[list[Any]]:
+    """Return a block of the mass matrix of shapes; of a diagonal block, as of `mass`, the rows up to the diagonal.
+
+    alone, twists: of the shapes of its rows.  momenta, others: of its columns, with the body that these move.
+    """
+    made = []
+    for row, momentum, twist in zip(mass, alone, twists, strict=False):
+        columns = zip(row, momenta, others, strict=False)
+        made.append([one + momentum.on(other) + moving.on(twist) for one, moving, other in columns])
+    return made
 
 
 def tensor(Q: Numbers) -> Symmetric:
@@ -271,86 +387,34 @@ def axial(M: Numbers) -> Vector:
 
 
 @routine
-def bend(forces: Numbers, station: Station, q: Numbers) -> list[Any]:
-    """Add the forces of a rod's elastic energy beyond that of its modal stiffness, at a station, to those on modes.
-
-    Rods resist bending in the axes of their twisted sections, and bending across bending twists them.
-    """
-    turns, curves = by_mode(station.rotation), by_mode(station.curvature)
-    theta, kappa = weighted(turns, q), weighted(curves, q)
-    c, s = cos(theta[0]), sin(theta[0])
-    twist = kappa[0] - 0.5 * (theta[1] * kappa[2] - theta[2] * kappa[1])
-    strain = Vector([twist, c * kappa[1] + s * kappa[2], c * kappa[2] - s * kappa[1]])
-    torque, m2, m3 = station.stiffness @ strain
-    half = 0.5 * torque
-    on_rotation = Vector([m2 * strain[2] - m3 * strain[1], -half * kappa[2], half * kappa[1]])
-    on_curvature = Vector([torque, c * m2 - s * m3 + half * theta[2], s * m2 + c * m3 - half * theta[1]])
-    on_curvature = on_curvature - station.stiffness @ kappa
-    both = zip(forces, turns, curves, strict=True)
-    return [f + dot(on_rotation, turn) + dot(on_curvature, curve) for f, turn, curve in both]
+def energies(
+    motion: Motion, mass: Any, first: Vector, sums: Sums, gravity: Vector, kinetic: Any, potential: Any
+) -> tuple[Any, Any]:
+    """Return sums with the kinetic energy of a body, without that of its shapes' masses, and its potential energy of
+    gravity."""
+    R, J, moved = motion.R_WB, tensor(sums.Q), sums.moved
+    omega, v, c = R.T @ motion.omega, R.T @ motion.v, first + moved.by
+    speeding = cross(omega, c) + moved.rate
+    moving = 0.5 * mass * dot(v, v) + dot(v, speeding) + 0.5 * dot(omega, J @ omega) + dot(omega, axial(sums.D))
+    return kinetic + moving, potential - dot(gravity, mass * motion.p_WB + R @ c)
 
 
 @routine
-def eliminate(body: Need, beyond: Sequence[Beyond], sound: Any) -> tuple[Gains, list[Any], Resistance, Any]:
-    """Eliminate the shapes of a body from its inertia with all that it carries.
-
-    Returns their gains; L^-1 of the forces on them; with what the body resists while they move freely; and `sound`,
-    which becomes 0 when a shape moves no mass.
-    """
-    I, F, P, m, needed = body.I, body.F, list(body.P), [list(row) for row in body.m], list(body.forces)
-    for (inertia, wrench), columns in beyond:
-        I, F = I + inertia, F + wrench
-        for i, column in enumerate(columns):
-            momentum = inertia.of(column)
-            P[i], needed[i] = P[i] + momentum, needed[i] + wrench.on(column)
-            m[i] = [one + momentum.on(other) for one, other in zip(m[i], columns, strict=False)]
-    diagonal = [row[i] for i, row in enumerate(m)]
-    _, L, least = c.cholesky(m, diagonal, diagonal, 1.0)
-    forces, K = forward(L, [-one for one in needed]), list[Wrench]()
-    for row, momentum, force in zip(L, P, forces, strict=True):
-        for factor, k in zip(row, K, strict=False):
-            momentum = momentum - k * factor
-        K.append(momentum * row[len(K)])
-        I, F = I.without(K[-1], 1.0), F + K[-1] * force
-    return Gains(L, K), forces, Resistance(I, F), select(least > MASSLESS, sound, 0.0)
+def energy_of_shapes(diagonal: int, mass: Rows, rates: Numbers, others: Numbers, kinetic: Any) -> Any:
+    """Return the sum with the kinetic energy of a block of the mass of shapes, of a `diagonal` one the lower part."""
+    for i, row in enumerate(mass):
+        halves = [0.5 if diagonal and i == j else 1.0 for j in range(len(row))]
+        kinetic = kinetic + rates[i] * sum((h * m * p for h, m, p in zip(halves, row, others, strict=False)), 0.0)
+    return kinetic
 
 
 @routine
-def spread(
-    gains: Gains, forces: Numbers, loads: Sequence[tuple[Wrenches, Columns]], wrenches: Wrenches, *rows: Any
-) -> Any:
-    """Eliminate the shapes of a body from the rows of a closure, as `closures.spread` does for the coordinates of its
-    joint; loads: wrenches at ports, and the motion of these per rate of each shape; wrenches: all together."""
-    on_shapes = [[0.0] * len(forces) for _ in wrenches]
-    for given, columns in loads:
-        on_shapes = [
-            [f + wrench.on(column) for f, column in zip(row, columns, strict=True)]
-            for row, wrench in zip(on_shapes, given, strict=True)
-        ]
-    V = list(zip(*(forward(gains.L, row) for row in on_shapes), strict=True))
-    for k, row in zip(gains.K, V, strict=True):
-        wrenches = [wrench - k * v for wrench, v in zip(wrenches, row, strict=True)]
-    return V, *c.less(V, forces, *rows), wrenches
-
-
-@routine
-def accelerate(basis: Places, T: Numbers, u: Numbers, gains: Gains, forces: Numbers, a: Twist) -> Any:
-    """Return the rates of the modes' coordinates and of their rates, and the accelerations of the shapes, by L^-T.
-
-    a: acceleration of the body as if rigid, without the known part.
-    """
-    shapes = backward(gains.L, [force - k.on(a) for force, k in zip(forces, gains.K, strict=True)])
-    modes = in_shapes([(shape, mode) for mode, shape in basis], T, shapes)
-    return [*u, *modes], shapes
-
-
-@routine
-def follow(a: Twist, columns: Columns, accelerations: Numbers) -> Twist:
-    """Return the acceleration at a port, from that of the body as if rigid, with the part of its shapes."""
-    return a + total(columns, accelerations)
+def elastic_energy(stiffness: Numbers, q: Numbers, elastic: Any) -> Any:
+    """Return the sum with the energy of the modal stiffness."""
+    return elastic + 0.5 * scalar(stiffness, [one * one for one in q])
 
 
 @routine
 def damping_power(damping: Numbers, u: Numbers) -> Any:
     """Return the power that is lost to damping [W]."""
-    return _dot(damping, [rate * rate for rate in u])
+    return scalar(damping, [rate * rate for rate in u])

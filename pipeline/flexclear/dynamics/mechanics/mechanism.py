@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
+from flexclear.dynamics.mechanics.modes import Modes
 from flexclear.dynamics.mechanics.trees import (
     Beyond,
     Body,
@@ -21,8 +22,8 @@ from flexclear.dynamics.mechanics.trees import (
     Site,
     Step,
 )
-from flexclear.dynamics.mechanics.vectors import AT_REST, Twist, Wrench
 from flexclear.dynamics.routines.calls import Cell
+from flexclear.dynamics.vectors import AT_REST, Twist, Wrench
 
 Cells = Sequence[Cell]
 
@@ -54,7 +55,7 @@ class Frame:
         if isinstance(self.undeformed, Site):
             return self.undeformed, ()
         modes = self.modes
-        return f.at_port(modes.held, self.carrier.motion, modes.twists, self.undeformed, *modes.moving)
+        return modes.at_port(self.carrier.motion, self.undeformed)
 
     @property
     def modes(self) -> Modes:
@@ -73,7 +74,7 @@ class Frame:
         """The part of the acceleration of its body with the frame that is from unknown rates of speeds."""
         if not self.deformed[1]:
             return self.carrier.acceleration
-        return f.follow(self.carrier.acceleration, self.deformed[1], self.modes.accelerations)
+        return self.modes.follow(self.carrier.acceleration, self.deformed[1])
 
     def resist(self, resistance: Resistance) -> None:
         """Let the body resist, through this frame, what is about the origin of the body."""
@@ -85,44 +86,14 @@ class Frame:
 
 
 @dataclass(eq=False)
-class Modes:
-    """Modes of a flexible body. Its numbers are in memory.
-
-    inboard: frame of the body's joint on the body.  q, u: coordinates and their rates.  rates: where the rates of these
-    are stored.  places, basis: see `flexible.need`; held: shapes that move no frame.  stations: of a rod that loads
-    stiffen.  book: of the ledger, for the loss.  The others follow as `flexible` has them.
-    """
-
-    inboard: Site | f.Port
-    body: f.Modal
-    q: Cells
-    u: Cells
-    rates: Cells
-    places: f.Places
-    basis: f.Places
-    held: int
-    stations: Sequence[f.Station]
-    book: int
-    twists: Columns = field(init=False)
-    gains: f.Gains = field(init=False)
-    forces: t.Numbers = field(init=False)
-    accelerations: t.Numbers = field(init=False)
-
-    @cached_property
-    def moving(self) -> tuple[t.Numbers, t.Numbers]:
-        """Coordinates and rates of the moving shapes."""
-        q, u = (f.moving(self.basis, self.body.T, self.held, values) for values in (self.q, self.u))
-        return q, u
-
-
-@dataclass(eq=False)
 class Link(Carrier):
     """A body with the joint that carries it. Its numbers are in memory.
 
     frame: of the joint, on the parent.  body: of a rigid body.  modes: of a flexible one.  rates: where those of its
-    positions and speeds are stored.  book: of the ledger, for its drives.  rubbed: True when its joint rubs.  The
-    others follow as `trees` has them; closing: wrenches of the closures on it and all beyond, by rows, and the
-    multipliers.
+    positions and speeds are stored.  book: of the ledger, for its drives.  watched: True when the wrench through its
+    joint is needed.  The others follow as `trees` has them; closing: wrenches of closures and of bearings on it and all
+    beyond, by rows, and their sizes; own: of the bearings of its joint, which that transmits; changes: of its speeds,
+    by forces alone.
     """
 
     frame: Frame
@@ -133,12 +104,14 @@ class Link(Carrier):
     rates: Cells = ()
     book: int = -1
     modes: Modes | None = None
-    rubbed: bool = False
+    watched: bool = False
     step: Step = field(init=False)
     rest: Resistance = field(init=False)
     gains: t.Gains = field(init=False, default=())
     forces: t.Numbers = field(init=False, default=())
+    changes: t.Numbers = field(init=False, default=())
     closing: list[tuple[c.Wrenches, t.Numbers]] = field(init=False, default_factory=list)
+    own: list[tuple[c.Wrenches, t.Numbers]] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         self.depth = self.frame.carrier.depth + 1
@@ -158,15 +131,17 @@ class Closure(NamedTuple):
     """A joint that closes a loop, or a gear. frames: on whose bodies its rows act.
 
     routine: takes what is given, the number of rows solved for, and the frames' ends, and returns what is stored in
-    `results`, then gamma of those rows and their wrenches on each body; see `closures.closure`.  diagonal, roots: of
-    the rows solved for, where the diagonal of J M^-1 J^T and of its inverse factor are stored.  scales: reference of
-    each pivot.
+    `results`, then gamma of those rows and their wrenches on each body; see `closures.closure`.  residuals, opening:
+    of the rows solved for, those results, and their rates.  diagonal, roots: where the diagonal of J M^-1 J^T and of
+    its inverse factor are stored.  scales: reference of each pivot.
     """
 
     routine: Callable
     given: tuple[Any, ...]
     frames: Sequence[Frame]
     results: Cells
+    residuals: Cells
+    opening: Cells
     diagonal: Cells
     roots: Cells
     scales: Cells
@@ -190,18 +165,20 @@ class Rubbed(NamedTuple):
     """A bearing with friction. given: what it is, its law and its numbers, and the state of its bristles.
 
     sliding, load, bends: where its sliding velocity with the bristles' rate, its load, and the parts of that with kinks
-    are stored.
+    are stored.  record: where that is stored which only the record has (`bearings.recorded`).
     """
 
     given: tuple[Any, ...]
     sliding: Cells
     load: Cell
     bends: Cells
+    record: Cells
 
 
 class Rubbing(NamedTuple):
     """Friction of an ideal joint. frames: of the joint.  link: that it carries, or None.  second: 1 when that is on the
-    side of the second frame, else -1.  closure: of a joint that closes a loop, or -1.  book: of the ledger."""
+    side of the second frame, else -1.  closure: of a joint that closes a loop, or -1.  book: of the ledger.  reactions:
+    where the record stores those of the joint, without friction, then per normal force of each bearing."""
 
     frames: tuple[Frame, Frame]
     link: Link | None
@@ -209,16 +186,19 @@ class Rubbing(NamedTuple):
     closure: int
     bearings: Sequence[Rubbed]
     book: int
+    reactions: Sequence[Cells]
 
 
 class Mechanism(NamedTuple):
-    """A mechanism. links: parents first, without the ground.  least_pivot: where the closures' smallest is stored.
+    """A mechanism. links: parents first, without the ground.  frames: all.  least_pivot: where the closures' smallest
+    is stored.
 
     ledger: where the rates are stored of those books that no action stores itself.
     """
 
     ground: Carrier
     links: Sequence[Link]
+    frames: Sequence[Frame]
     closures: Sequence[Closure]
     actions: Sequence[Action]
     rubbing: Sequence[Rubbing]

@@ -8,24 +8,39 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.effects import Parts
+from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
 from flexclear.dynamics.mechanics.evaluation import evaluated
-from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes, Station
-from flexclear.dynamics.mechanics.joints import JOINTS
-from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism, Modes
+from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes
+from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism
+from flexclear.dynamics.mechanics.modes import Modes, split
+from flexclear.dynamics.mechanics.record import describe
+from flexclear.dynamics.mechanics.responses import LISTS, listed
+from flexclear.dynamics.mechanics.sections import Station
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
-from flexclear.dynamics.mechanics.vectors import Matrix, Symmetric, Vector
 from flexclear.dynamics.routines.calls import RATES, STATE, CallList, Cell, cells
 from flexclear.dynamics.routines.straight import OneTape
 from flexclear.dynamics.specialise.code import Program
 from flexclear.dynamics.specialise.topology import Topology
+from flexclear.dynamics.vectors import Matrix, Symmetric, Vector
 
 
-def list_of(parts: Parts, topology: Topology) -> CallList:
-    """Return the list of calls that evaluates a mechanism; see `evaluation.evaluated`."""
-    return evaluated(mechanism_of(Tables(parts, topology)), CallList())
+def list_of(parts: Parts, topology: Topology, where: int = m.CALLS, calls: CallList | None = None) -> CallList:
+    """Return the list of calls that evaluates a mechanism, or another one by the place of its address in h.
+
+    In RECORD_CALLS it stores, as well, all that the record has of the mechanism.  calls: to which the calls are
+    appended.  See `evaluation.evaluated`, `record.describe` and `responses.listed`.
+    """
+    tables, made = Tables(parts, topology, where == m.RECORD_CALLS), CallList() if calls is None else calls
+    mechanism = mechanism_of(tables)
+    if where in LISTS:
+        return listed(mechanism, made, where)
+    loops = evaluated(mechanism, made)
+    if tables.recorded:
+        describe(tables, mechanism, loops, made)
+    return made
 
 
 def program_of(parts: Parts, topology: Topology, longest: int) -> Program:
@@ -50,7 +65,8 @@ def mechanism_of(tables: Tables) -> Mechanism:
         place(i - 1)
         numbers, modes = tables.row(m.LINK_NUMBERS, i), _modes(tables, flexible[i]) if i in flexible else None
         body, kind = Body(numbers[0], Vector(numbers[1:4]), Symmetric(numbers[4:10])), tables.parts.joints[row["joint"]]
-        links.append(Link(frames[-1], kind, body, Bounds(*numbers[10:]), *_joint_state(tables, row, kind), modes))
+        state = _joint_state(tables, row, kind)
+        links.append(Link(frames[-1], kind, body, Bounds(*numbers[10:]), *state, modes, tables.recorded))
         carriers.append(links[-1])
     for k in range(len(links), len(sites)):
         place(k)
@@ -64,7 +80,7 @@ def mechanism_of(tables: Tables) -> Mechanism:
         {k: cell for k, cell in books if cell.key not in stored},
         tables.stretch(m.PIVOT, m.LAST_PIVOT, 1),
     )
-    return Mechanism(ground, links, closures, actions, rubbing, tables.row(m.GRAVITY, 0), ledger, least)
+    return Mechanism(ground, links, frames, closures, actions, rubbing, tables.row(m.GRAVITY, 0), ledger, least)
 
 
 def _site(tables: Tables, table: Any, k: int) -> Site:
@@ -83,6 +99,16 @@ class _Stretch:
         found = self.tables.row(self.table, self.row, count * length)
         self.row += count * length
         return [found[length * k : length * (k + 1)] for k in range(count)]
+
+    def lower(self, count: int, full: list[bool]) -> list[list[Any]]:
+        """Return the lower part of the next square matrix; of rows that are not full only the diagonal."""
+        begin = self.row
+        self.row += count * count
+        made = list[list[Any]]()
+        for i in range(count):
+            first = 0 if full[i] else i
+            made.append([0.0] * first + self.tables.row(self.table, begin + count * i + first, i + 1 - first))
+        return made
 
 
 def _second(tables: Tables, numbers: _Stretch, n: int) -> list[Any]:
@@ -105,27 +131,32 @@ def _modes(tables: Tables, k: int) -> Modes:
     n, held, q, u = int(body["n_modes"]), int(body["n_held"]), int(body["q0"]), tables.nq + int(body["c0"])
     inboard = int(table(m.LINKS)["inboard_port"][body["link"]])
     of_body, data = tables.row(m.FLEX_NUMBERS, k), _Stretch(tables, m.FLEX_DATA, body["data0"])
-    linear, E, _, diagonals = (data.rows(count, n) for count in (3, 9, n, 2))
+    linear, E = (data.rows(count, n) for count in (3, 9))
+    data.row += n * n
+    diagonals = data.rows(2, n)
     in_shapes = _Stretch(tables, m.INTERFACE_DATA, body["interface0"])
-    moved, mass = in_shapes.rows(3, n), in_shapes.rows(n, n)
-    coupled = [int(body["coupled"]) and i >= held for i in range(n)]
+    moved = in_shapes.rows(3, n)
+    # without held shapes, shapes are eigenmodes
+    wanted = [bool(body["coupled"]) and i >= held for i in range(n)], [i >= held > 0 for i in range(n)]
+    mass, stiff = (in_shapes.lower(n, full) for full in wanted)
     first, ends = int(body["moment_row0"]), table(m.MOMENT_ROWS)["end"]
     begin, entries = int(body["moment0"]), range(int(body["basis0"]), int(body["basis0"] + body["n_basis"]))
     rows = np.searchsorted(ends[first : first + 9 * n], np.arange(begin, ends[first + 9 * n - 1]), side="right")
     modes = table(m.MOMENTS)["mode"][begin : begin + len(rows)]
+    pairs = tables.row(m.MOMENT_VALUES, begin, len(rows) if len(split(n)) == 1 else min(len(rows), 1))
     modal = Modal(
         of_body[0], Vector(of_body[1:4]), Matrix(of_body[4:13]), Symmetric(of_body[13:]),
         Shapes(linear, _second(tables, data, n)), E, diagonals[0], diagonals[1],
-        [(whole, alone) for whole, alone in (tables.row(m.MOMENT_VALUES, begin + e) for e in range(len(rows)))],
+        list(zip(pairs[::2], pairs[1::2], strict=True)),
         tables.row(m.BASIS_VALUES, entries.start, len(entries)),
-        moved, [[mass[i][j] if i == j or coupled[i] else 0.0 for j in range(i + 1)] for i in range(n)],
+        moved, mass,
     )  # fmt: skip
     return Modes(
         _port(tables, inboard) if body["inboard"] else _site(tables, m.PORT_NUMBERS, inboard),
         modal, cells(STATE, q, n), cells(STATE, u, n), [*cells(RATES, q, n), *cells(RATES, u, n)],
-        tuple((int(r) // n, int(mode), int(r) % n) for r, mode in zip(rows, modes, strict=True)),
-        tuple((int(mode), int(shape)) for mode, shape in table(m.BASIS)[entries.start : entries.stop]),
-        held, _stations(tables, k, n), int(body["book"]),
+        list(zip((rows // n).tolist(), modes.tolist(), (rows % n).tolist(), strict=True)),
+        table(m.BASIS)[entries.start : entries.stop].tolist(),
+        held, _stations(tables, k, n), stiff, int(body["book"]),
     )  # fmt: skip
 
 
@@ -147,7 +178,7 @@ def _joint_state(tables: Tables, link: Any, kind: str) -> tuple[Coordinates, lis
         laws = [tables.row(m.LAW, k - tables.nv) for k in range(u, u + count)]
         book = int(tables.table(m.DRIVES)["book"][u - tables.nv])
         return Coordinates(*map(list, zip(*laws, strict=True))), [], book
-    places = (q, count + JOINTS[kind].redundant), (tables.nq + u, count)
+    places = (q, len(JOINTS[kind].POSITIONS) if count else 0), (tables.nq + u, count)
     x, v = (cells(STATE, *place) for place in places)
     return Coordinates(x, v, [0.0] * count), [cell for place in places for cell in cells(RATES, *place)], -1
 
@@ -159,12 +190,13 @@ def _closures(tables: Tables, frames: list[Frame]) -> list[Closure]:
         row0, count, kept0, kept = (int(one[name]) for name in ("row0", "n_rows", "kept0", "n_kept"))
         scales, diagonal = (tables.stretch(m.ROW_SCALE, first + kept0, kept) for first in (0, every))
         roots = [cell for r in range(kept0, kept0 + kept) for cell in tables.stretch(m.SCHUR, origins[r] + r, 1)]
-        residuals = [cell for at in (m.RESIDUAL, m.RESIDUAL_RATE) for cell in tables.stretch(at, row0, count)]
-        factor, of_joint = (diagonal, roots, scales), (tuple(rows[row0 : row0 + count]),)
+        residuals, opening = (tables.stretch(at, row0, count) for at in (m.RESIDUAL, m.RESIDUAL_RATE))
+        results, of_joint = [*residuals, *opening], (tuple(rows[row0 : row0 + count]),)
+        factor = residuals[:kept], opening[:kept], diagonal, roots, scales
         if one["coupling"] >= 0:
             which, given, joined, turning = gear(tables, frames, int(one["coupling"]))
-            made.append(Closure(which, given, joined, [*residuals, *turning], *factor))
+            made.append(Closure(which, given, joined, [*results, *turning], *factor))
         else:
             joined = [frames[one["site_a"]], frames[one["site_b"]]]
-            made.append(Closure(closure, of_joint, joined, residuals, *factor))
+            made.append(Closure(closure, of_joint, joined, results, *factor))
     return made

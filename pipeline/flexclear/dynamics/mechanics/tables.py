@@ -24,10 +24,14 @@ def _record(name: str) -> Any:
 
 @dataclass(frozen=True)
 class Tables:
-    """Kinds of a mechanism's parts, and its topology. Places in f and w count from the start of their stretch."""
+    """Kinds of a mechanism's parts, and its topology. Places in f and w count from the start of their stretch.
+
+    recorded: whether all is stored that the record has, not only what steps read.
+    """
 
     parts: Parts
     topology: topologies.Topology
+    recorded: bool = False
 
     def size(self, index: int) -> int:
         """Return a size from the header."""

@@ -27,11 +27,10 @@ class WorkSpace(NamedTuple):
 
 @dataclass(frozen=True)
 class Arrays:
-    """Topology h and numbers f of a mechanism; columns: number of its twist columns."""
+    """Topology h and numbers f of a mechanism."""
 
     h: np.ndarray
     f: np.ndarray
-    columns: int
 
     def size(self, index: int) -> int:
         """Return a size from the header."""
@@ -55,7 +54,7 @@ class Arrays:
         room: sizes that the integration method needs.
         """
         h, end = self.h.copy(), 0
-        lengths = _work_lengths(h, room, self.columns)
+        lengths = _work_lengths(h, room)
         for index, length in lengths.items():
             h[index] = end
             end += length
@@ -88,7 +87,7 @@ def named_rows(table: Any, entries: Any) -> np.ndarray:
     return m.named(table, rows(table, entries).ravel())
 
 
-def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> Arrays:
+def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any]) -> Arrays:
     """Pack tables, each a sequence of rows, into h and f.
 
     sizes: those of the header that do not follow from the tables.
@@ -104,7 +103,7 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
             arrays[array].append(filled.ravel())
     for index, size in (_sizes(counts, tables) | dict(sizes)).items():
         h[index] = size
-    return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]), columns)
+    return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]))
 
 
 def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int]:
@@ -114,13 +113,11 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
     return {m.SIZES[f"n_{name}"]: count[table] for name, table in counted.items()} | {
         m.N_FLEX: count[m.FLEXES],
         m.N_KEPT_ROWS: count[m.CLOSURE_ENVELOPE],
-        m.NV: count[m.ENVELOPE],
         m.NY: count[m.GROUPS],
         m.N_GROUPS: count[m.FLOORS],
         m.N_COMPONENTS: count[m.BOOKS],
-        m.MASS_SIZE: envelope_size(named_rows(m.ENVELOPE, tables[m.ENVELOPE])),
         m.SCHUR_SIZE: envelope_size(named_rows(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
-        m.JACOBIAN_SIZE: int(np.sum(3 * closures["threes"] * closures["n_support"])),
+        m.JACOBIAN_SIZE: int(np.sum(closures["n_rows"] * closures["n_support"])),
     }
 
 
@@ -131,9 +128,9 @@ def envelope_size(envelope: np.ndarray) -> int:
     return int(np.max(envelope["origin"] + np.arange(1, len(envelope) + 1)))
 
 
-def _work_lengths(h: np.ndarray, room: m.Room, columns: int) -> dict[int, int]:
+def _work_lengths(h: np.ndarray, room: m.Room) -> dict[int, int]:
     """Return the lengths of the stretches and tables of w, by their indices in the header, in ascending order."""
-    known = {name: int(h[index]) for name, index in m.SIZES.items()} | vars(room) | {"columns": columns}
+    known = {name: int(h[index]) for name, index in m.SIZES.items()} | vars(room)
 
     def factor(text: str) -> int:
         return int(text) if text.isdigit() else min(1, known[text[1:]]) if text[0] == "?" else known[text]

@@ -36,8 +36,7 @@ def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
         moments, where, row_ends = _moments(bundle)
         basis, moves = numbering.bases[i], int(_inboard_moves(mechanism, i))
         entries, places = basis.entries(), (i, len(q), q.start, c.start, len(data), len(value), len(ends))
-        held = sum(j < basis.held for _, j in entries)
-        of_basis = (basis.held, len(entry), len(entries), len(entry) + held, len(interface))
+        of_basis = (basis.held, len(entry), len(entries), len(interface))
         flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis, losses[mechanism.components.of(i)]))
         flex_real.append(
             [
@@ -198,8 +197,8 @@ def _ports(numbering: Numbering, stiffened: bool) -> tuple[list[Any], list[Any],
     """Return the tables of ports: of sites, then one per flexible link's own frame (`Numbering.port_of_inboard`)."""
     mechanism = numbering.mechanism
     rows, reals, data = list[Any](), list[Any](), list[float]()
-    ports = [(numbering.sites[p.site].link, p.frame.partition(".")[2], p.column) for p in numbering.ports]
-    for link, frame, column in [*ports, *((i, _inboard_frame(mechanism, i), -1) for i in numbering.flexible)]:
+    ports = [(numbering.sites[p.site].link, p.frame.partition(".")[2]) for p in numbering.ports]
+    for link, frame in [*ports, *((i, _inboard_frame(mechanism, i)) for i in numbering.flexible)]:
         n = len(numbering.modal_positions[link])
         if frame is None:
             pose, *shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), np.zeros((3, n)), np.zeros((3, n))
@@ -209,7 +208,7 @@ def _ports(numbering: Numbering, stiffened: bool) -> tuple[list[Any], list[Any],
         if stiffened:
             forms = (None, None) if frame is None else second_motion(mechanism, link, frame)
             chunks += [np.zeros(3 * n * n) if form is None else form.ravel() for form in forms]
-        rows.append((numbering.flexible.index(link), column, len(data)))
+        rows.append((numbering.flexible.index(link), len(data)))
         reals.append(pose)
         data += np.concatenate(chunks).tolist()
     return rows, reals, data

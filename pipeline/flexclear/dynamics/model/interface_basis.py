@@ -24,7 +24,7 @@ UNCOUPLED = 1e-11
 
 @dataclass(frozen=True)
 class InterfaceBasis:
-    """Orthogonal T of `bodies.interface`, (mode, shape); `held`: number of the first shapes, which move no frame."""
+    """Orthogonal T, q = T p, (mode, shape); `held`: number of the first shapes, which move no frame."""
 
     matrix: np.ndarray
     held: int

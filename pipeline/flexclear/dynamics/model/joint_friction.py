@@ -1,9 +1,9 @@
-"""Tables of ideal joints with friction: bearings, coordinates that move them, and closures in their reactions."""
+"""Tables of ideal joints with friction: with their bearings."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from flexclear.dynamics import memory as m
@@ -12,12 +12,9 @@ from flexclear.dynamics.model.components import Floors, Group
 from flexclear.dynamics.model.contacts import bristle, friction_law
 from flexclear.dynamics.model.filling import Filling
 from flexclear.dynamics.model.guards import Guard, speeds
-from flexclear.dynamics.model.index_tables import closure_route, uncommon
 from flexclear.dynamics.model.mechanism import Mechanism
-from flexclear.dynamics.model.numbering import Numbering
 from flexclear.scene.parts import IdealJoint
 
-Rows = list[tuple[int, ...]]
 BENDS = m.NAMED["bends"]
 #: load components of a bearing, by its field of BENDS, with the number of their components
 PRESSES = {"along": 1, "about": 1, "one_end": 2, "other_end": 2}
@@ -53,8 +50,6 @@ def fill(filling: Filling) -> dict[str, Any]:
     """Tabulate the joints with friction and their bearings."""
     numbering, closures = filling.numbering, filling.closures
     mechanism, laws = numbering.mechanism, filling.parts.kinds("joint_friction")
-    pairs = [(c, part, *both) for c, one in enumerate(closures) for part, both in enumerate(one.ends)]
-    ends = [(c, part, numbering.site(a), numbering.site(b)) for c, part, a, b in pairs]
     slot = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.joints_with_friction())
     tables: dict[str, list[Any]] = defaultdict(list)
     for number, (name, joint) in enumerate(mechanism.scene.joints_with_friction().items()):
@@ -62,14 +57,8 @@ def fill(filling: Filling) -> dict[str, Any]:
         sites = numbering.site(a), numbering.site(b)
         link, reverse = _link(mechanism, name)
         closure = next((c for c, one in enumerate(closures) if one.name == name), -1)
-        entries = uncommon(closure_route(numbering, *sites))
-        loops = _loops_beyond(numbering, link, ends) if link >= 0 else []
-        ranges = (
-            *_added(tables["rubbing_entries"], entries),
-            *_added(tables["reaction_loops"], loops),
-        )
         where = len(tables["bearings"]), len(BEARINGS[joint.type])
-        tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges, *where))
+        tables["rubbing"].append((*sites, link, int(reverse), closure, *where))
         for kind, side, axis in BEARINGS[joint.type]:
             size = bristle(name, joint)
             law = laws.index(joint.friction.kind) if joint.friction is not None else -1
@@ -77,12 +66,6 @@ def fill(filling: Filling) -> dict[str, Any]:
             tables["bearing_numbers"].append(_numbers(name, joint, kind))
             slot += 3 if size is not None else 0
     return tables
-
-
-def _added(table: Rows, rows: Sequence[tuple[int, ...]]) -> tuple[int, int]:
-    """Append rows to a table; return the index of the first one and their number."""
-    table += rows
-    return len(table) - len(rows), len(rows)
 
 
 def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
@@ -104,21 +87,3 @@ def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
         if link.branch.edge is not None and link.branch.edge.name == name
     ]
     return bearings[-1] if bearings else (-1, False)
-
-
-def _loops_beyond(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]]) -> Rows:
-    """Return the closures that act beyond a link's joint, as rows of reaction_loops.
-
-    ends: (closure, part, first site, second site) of all closures; a coupling has two parts.
-    """
-    mechanism = numbering.mechanism
-    beyond = {link}
-    for i in range(link + 1, len(mechanism.links)):
-        if mechanism.links[i].branch.parent in beyond:
-            beyond.add(i)
-    loops: Rows = []
-    for c, part, a, b in ends:
-        sign = int(numbering.sites[b].link in beyond) - int(numbering.sites[a].link in beyond)
-        if sign:
-            loops.append((c, sign, part))
-    return loops

@@ -137,6 +137,7 @@ def fill_model(
     ny = len(tables[m.GROUPS])
     sizes = {
         m.NQ: numbering.nq,
+        m.NV: numbering.nv,
         m.N_LEDGER: ny - numbering.nq - numbering.nv,
         m.N_DRIVES: numbering.known,
         m.N_INTERNAL: gauges.internal,
@@ -145,7 +146,7 @@ def fill_model(
         **{m.SIZES[f"{effect.name}_slot"]: slots[effect.name] for effect in parts.present if effect.ledger},
         m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
     }
-    arrays = pack(sizes, tables, numbering.columns)
+    arrays = pack(sizes, tables)
     of_mechanism = (mechanism.drives, mechanism.drive_signs, gravity, mechanism.length)
     made = (mechanism, numbering, parts, arrays, mechanism.scene, mechanism.links, ordered, mechanism.contacts, normals)
     return Model(*made, loaded.loads, *of_mechanism, numbering.nq, numbering.nv, ny)
@@ -187,7 +188,6 @@ def _topology_tables(numbering: Numbering, parts: Parts, books: Books) -> dict[A
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
         m.SITE_NUMBERS: [np.concatenate([s.placement.p, s.placement.R.ravel()]) for s in numbering.sites],
         **flexible_bodies.fill(numbering, [book.loss for book in books]),
-        **index_tables.mass_entries(numbering),
     }
 
 
@@ -206,16 +206,13 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool)
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
     """Return the rows of the table LINKS."""
     rows: list[tuple[int, ...]] = []
-    last = {link.branch.parent: i for i, link in enumerate(numbering.mechanism.links) if i}
     for i, link in enumerate(numbering.mechanism.links):
         joint = parts.joints.index(link.kind) if i else -1
         flex = numbering.flexible.index(i) if link.flexible else -1
         inboard = numbering.port_of_inboard(i) if link.flexible else -1
-        port = numbering.port_of(i - 1) if i else -1
         q, c = numbering.positions[i], numbering.coordinates[i]
         part = numbering.mechanism.components.of_link[i]
-        where = (link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, port, part)
-        rows.append((*where, int(i not in last), int(last.get(link.branch.parent) == i)))
+        rows.append((link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, part))
     return rows
 
 

@@ -36,7 +36,7 @@ from flexclear.dynamics.model.model import Model
 #: singular values of naturally sized rows below this are zero.  The bound is above the rounding of a zero: an entry is
 #: a sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
 #: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it is
-#: below the root of `closures.SINGULAR_PIVOT`, 3e-7, at which the kernels no longer solve for a row.
+#: below the root of `mechanics.closures.SINGULAR`, 3e-7, at which no evaluation solves for a row.
 ZERO_SINGULAR_VALUE = 1e-7
 
 

@@ -7,13 +7,11 @@ rank; the others are only observed.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.arrays import envelope_size
-from flexclear.dynamics.model.index_tables import closure_envelope, threes
+from flexclear.dynamics.model.index_tables import closure_envelope
 from flexclear.dynamics.model.model import Model
 
 
@@ -56,47 +54,6 @@ def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndar
     return scales
 
 
-def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, factor: np.ndarray) -> np.ndarray:
-    """Return the length in the metric of the mass that each closure row would have without cancellation; shape (rows,).
-
-    columns: rows of the work space's table COLUMNS; points: origins of all sites, (sites, 3); factor: L of the mass
-    matrix.  A rotation has the mechanism's size as its arm, in place of distances that only rounding resolves.
-    All lengths are 0 where the mass matrix has no factor.
-    """
-    from scipy.linalg import solve_triangular
-
-    arrays, lengths = model.arrays, np.zeros(model.arrays.size(m.N_CLOSURE_ROWS))
-    if not np.all(factor.diagonal() > 0.0):
-        return lengths
-    entries, support = arrays.table(m.ENTRIES), arrays.table(m.SUPPORT)["coordinate"]
-    inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
-    mobility = np.sum(inverse**2, axis=0)  # diagonal of M^-1
-    for c in arrays.table(m.CLOSURES):
-        total: np.ndarray = np.zeros(c["n_rows"])
-        for part, (site, turning, ratio) in enumerate(_second_sites(model, c)):
-            mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
-            mine = mine[mine["part"] == part]
-            turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
-            angle = np.linalg.norm(turn, axis=1)
-            way = np.linalg.norm(shift + np.cross(turn, points[site]), axis=1) + model.length * angle
-            mobilities = mobility[support[c["support0"] + mine["slot"]]]
-            along, about = (np.sum((ratio * size) ** 2 * mobilities) for size in (way, angle))
-            total = total + np.where(turning, about, along)
-        lengths[c["row0"] : c["row0"] + c["n_rows"]] = np.sqrt(total)
-    return lengths
-
-
-def _second_sites(model: Model, c: Any) -> list[tuple[int, np.ndarray, float]]:
-    """Return per part of a closure (row of CLOSURES): second site, mask of its rotational rows, and their factor."""
-    arrays, k = model.arrays, c["coupling"]
-    if k < 0:
-        return [(c["site_b"], arrays.table(m.CLOSURE_ROWS)["kind"][c["row0"] : c["row0"] + c["n_rows"]] == 1, 1.0)]
-    gauges, coupling = arrays.table(m.GAUGES), arrays.table(m.NAMED["couplings"])[k]
-    ratio = arrays.table(m.NAMED["coupling_numbers"])["ratio"][k]
-    both = ((gauges[coupling[side]], factor) for side, factor in (("second", 1.0), ("first", ratio)))
-    return [(gauge["b"], gauge["turning"] == 1, factor) for gauge, factor in both]
-
-
 def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
     """Write into h, a copy of the model's topology tables, the `selected` rows for which the kernels solve.
 
@@ -111,7 +68,6 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
         order = np.argsort(~selected[span], kind="stable")
         rows[span] = declared[span][order]
         closure["kept0"], closure["n_kept"] = start, np.sum(selected[span])
-        closure["threes"] = threes(closure["n_kept"])
         start += int(closure["n_kept"])
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
     envelope["first"][:start], envelope["origin"][:start] = closure_envelope(
@@ -121,19 +77,14 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
 
 
 def dense_rows(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
-    """Return selected rows by free coordinates, (..., kept, nv), from the supports that the kernels store.
-
-    stored: JACOBIAN or SPREAD of the work space, shape (..., size).
-    """
+    """Return selected rows by free coordinates, (..., kept, nv), from those by their supports; stored: JACOBIAN of the
+    work space, shape (..., size)."""
     support = model.arrays.table(m.SUPPORT)["coordinate"]
     full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), model.nv))
     for c in model.arrays.table(m.CLOSURES, h):
-        count, slots, groups = int(c["n_kept"]), int(c["n_support"]), int(c["threes"])
-        columns = support[c["support0"] : c["support0"] + slots]
-        block = stored[..., c["jacobian0"] : c["jacobian0"] + 3 * groups * slots]
-        block = np.swapaxes(block.reshape(*stored.shape[:-1], groups, slots, 3), -1, -2)
-        block = block.reshape(*stored.shape[:-1], 3 * groups, slots)[..., :count, :]
-        full[..., c["kept0"] : c["kept0"] + count, columns] = block
+        count, size = int(c["n_kept"]), int(c["n_support"])
+        block = stored[..., c["jacobian0"] : c["jacobian0"] + count * size].reshape(*stored.shape[:-1], count, size)
+        full[..., c["kept0"] : c["kept0"] + count, support[c["support0"] : c["support0"] + size]] = block
     return full
 
 

@@ -17,12 +17,13 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
+from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.code import Program
+from flexclear.dynamics.specialise.symbols import Indexed, leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, Branch, Loop, Symbol
 
 #: numbers of the scene, the state, its rates, the work space of the engine, the results of the list's own calls, and
@@ -46,18 +47,6 @@ class Span:
 
     def __init__(self, array: str, index: int) -> None:
         self.array, self.index = array, index
-
-
-class Indexed:
-    """A span in a routine: numbers by their index, an integer or a symbol. load: of the number at an index."""
-
-    __slots__ = ("load",)
-
-    def __init__(self, load: Callable[[Any], Any]) -> None:
-        self.load = load
-
-    def __getitem__(self, index: Any) -> Any:
-        return self.load(index)
 
 
 class Code(NamedTuple):
@@ -95,6 +84,9 @@ class Call(NamedTuple):
 #: goes back by as many entries as its second offset says, if the number at its first one exceeds one half
 BACK = Code("back", Program([], []), (RESULTS,))
 
+#: most products of a row, and most rows, of a call
+MOST, TOGETHER = 16, 4
+
 _building: ContextVar[CallList | None] = ContextVar("building", default=None)
 
 
@@ -124,12 +116,14 @@ def routine(function: Callable) -> Callable:
 class CallList:
     """A list of calls under construction.
 
-    size: number of results in memory; the first one is kept free, for what the list reports, as a `number`.
+    size: number of results in memory; the first one is kept free, for what the list reports, as a `number`.  ends: of
+    parts, which run one by one, with the results of those before.
     """
 
     number: ClassVar[type] = float
     calls: list[Call] = field(default_factory=list)
     size: int = 1
+    ends: list[int] = field(default_factory=list)
     _kinds: dict[Any, _Kind] = field(default_factory=dict)
     _known: dict[Any, Any] = field(default_factory=dict)
 
@@ -141,6 +135,10 @@ class CallList:
             yield self
         finally:
             _building.reset(token)
+
+    def divide(self) -> None:
+        """End a part of the list."""
+        self.ends.append(len(self.calls))
 
     @cached_property
     def codes(self) -> list[Code]:
@@ -179,6 +177,44 @@ class CallList:
         if cells:
             self.call(_same, (list(values),), cells)
 
+    @staticmethod
+    def located(numbers: Sequence[Any], stride: int = 1) -> list[Any]:
+        """Return numbers as what locates each alone, whatever is adjacent, so that calls are of few kinds; only the
+        first one, where the others follow it at a stride."""
+        alone = [Span(one.array, one.index) if isinstance(one, Cell) else one for one in numbers]
+        follow = (
+            isinstance(b, Span) and b.index - a.index == stride for a, b in pairwise(alone) if isinstance(a, Span)
+        )
+        return alone[:1] if sum(follow) == len(alone) - 1 else alone
+
+    def products(
+        self, first: Cell, stride: int, entries: Sequence[np.ndarray], vectors: Sequence[Sequence[Any]], count: int
+    ) -> list[list[Any]]:
+        """Append calls that multiply vectors by a sparse matrix of `count` rows, whose numbers are in memory.
+
+        first, stride: place of its first number, and from one to the next.  entries: row, ascending, column, and which
+        number it is, of each.
+        """
+        sums = [cells(RESULTS, self.size + k * count, count) for k in range(len(vectors))]
+        self.size += len(vectors) * count  # they are zero as long as nothing is stored
+        ends, alike = np.flatnonzero(np.diff(entries[0], append=-1)) + 1, dict[tuple[int, ...], list[Any]]()
+        for begin, end in pairwise([0, *ends.tolist()]):
+            row, columns, numbers = (one[begin:end].tolist() for one in entries)
+            values = [Cell(first.array, first.index + stride * number) for number in numbers]
+            alike.setdefault(tuple(columns), []).append(([one[row[0]] for one in sums], values))
+        for columns, rows in alike.items():
+            full = len(rows) - len(rows) % TOGETHER
+            groups = [rows[k : k + TOGETHER] for k in range(0, full, TOGETHER)] + [[one] for one in rows[full:]]
+            for k in range(0, len(columns), MOST):
+                part = slice(k, min(k + MOST, len(columns)))
+                given = [self.located([vector[one] for one in columns[part]]) for vector in vectors]
+                for group in groups:
+                    factors = [self.located(numbers[part], stride) for _, numbers in group]
+                    places = [place for place, _ in group]
+                    before = places if k else [[0.0] * len(sums)] * len(group)
+                    self.call(_increased, (part.stop - k, stride, before, factors, given), leaves(places))
+        return sums
+
     def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
         """Append calls of a loop, and return the state after it: nested tuples of numbers.
 
@@ -195,8 +231,38 @@ class CallList:
         return present
 
 
+def products(*given: Any) -> list[list[Any]]:
+    """Append calls to the list that is under construction; see `CallList.products`."""
+    calls = _building.get()
+    assert calls is not None
+    return calls.products(*given)
+
+
 def _same(values: Any) -> Any:
     return (values,)
+
+
+def _increased(
+    count: int,
+    stride: int,
+    sums: Sequence[Sequence[Any]],
+    rows: Sequence[Sequence[Any]],
+    vectors: Sequence[Sequence[Any]],
+) -> tuple[Any]:
+    """Return sums, of each row for each vector, with the products of numbers; see `CallList.products`."""
+    entries = [[_located(vector, k, 1) for k in range(count)] for vector in vectors]
+    made = list[Any]()
+    for before, row in zip(sums, rows, strict=True):
+        numbers = [_located(row, k, stride) for k in range(count)]
+        for one, vector in zip(before, entries, strict=True):
+            made.append(sum((a * x for a, x in zip(numbers, vector, strict=True)), one))
+    return (made,)
+
+
+def _located(numbers: Sequence[Any], k: int, stride: int) -> Any:
+    """Return a number that is located alone, or by the first one."""
+    one = numbers[min(k, len(numbers) - 1)]
+    return one[stride * k if len(numbers) == 1 else 0] if isinstance(one, Indexed) else one
 
 
 def cells(array: str, begin: int, count: int) -> list[Cell]:

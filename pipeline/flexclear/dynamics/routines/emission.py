@@ -1,8 +1,9 @@
 """LLVM code of routines, and of the function that runs a list of their calls.
 
 The function is ``evaluate(h, f, w, n, t, y, dy)`` like that of kernels: it evaluates the laws of time at t, then calls
-each code of the list whose address is in h (`memory`), and reports in n the status that is the list's first result. The
-list is four words: number of calls, addresses of their codes, addresses of their offsets, address of the results.
+each code of the list whose address is at a place in h (`memory`), and reports in n the status that is the list's first
+result. The list is four words: number of calls, addresses of their codes and of their offsets, address of the results.
+For lists that do not evaluate, that address is a last argument.
 """
 
 from __future__ import annotations
@@ -50,30 +51,32 @@ def routine_text(code: Code) -> str:
     return str(builder.module)
 
 
-def interpreter_text() -> str:
-    """Return the LLVM text of the function that runs a list of calls."""
-    function, builder = _begun(_EVALUATE)
-    h, f, w, n, t, y, dy = function.args
-    laws = ir.FunctionType(_WORD, _EVALUATE.args[:5]).as_pointer()
-    builder.call(builder.inttoptr(_read(builder, h, m.PRESCRIBE), laws), [h, f, w, n, t])
-    head = builder.inttoptr(_read(builder, h, m.CALLS), _WORD.as_pointer())
+def interpreter_text(place: int | None) -> str:
+    """Return the LLVM text of the function that runs the list of calls at a place of h, or one that it is given."""
+    function, builder = _begun(_EVALUATE if place else ir.FunctionType(_WORD, [*_EVALUATE.args, _WORD]))
+    h, f, w, n, t, y, dy, *given = function.args
+    if place:
+        laws = ir.FunctionType(_WORD, _EVALUATE.args[:5]).as_pointer()
+        builder.call(builder.inttoptr(_read(builder, h, m.PRESCRIBE), laws), [h, f, w, n, t])
+    head = builder.inttoptr(given[0] if given else _read(builder, h, place), _WORD.as_pointer())
     count, codes, offsets, results = (_read(builder, head, k) for k in range(4))
     codes, offsets = (builder.inttoptr(one, _WORD.as_pointer()) for one in (codes, offsets))
     results = builder.inttoptr(results, _FLOAT.as_pointer())
-    given = [f, builder.gep(w, [y]), builder.gep(w, [dy]), w, results, builder.gep(n, [_read(builder, n, m.MODE)])]
+    arrays = [f, builder.gep(w, [y]), builder.gep(w, [dy]), w, results, builder.gep(n, [_read(builder, n, m.MODE)])]
     before, loop, after = builder.block, builder.append_basic_block(), builder.append_basic_block()
     builder.branch(loop)
     builder.position_at_end(loop)
     k = builder.phi(_WORD)
     code, where = (_read(builder, table, k) for table in (codes, offsets))
     routine, where = builder.inttoptr(code, _ROUTINE.as_pointer()), builder.inttoptr(where, _OFFSET.as_pointer())
-    following = builder.add(k, builder.call(routine, [*given, where]))
+    following = builder.add(k, builder.call(routine, [*arrays, where]))
     k.add_incoming(_WORD(0), before)
     k.add_incoming(following, loop)
     builder.cbranch(builder.icmp_signed("<", following, count), loop, after)
     builder.position_at_end(after)
     status = builder.fptosi(builder.load(results), _WORD)
-    for index, value in ((m.STATE, y), (m.EVALUATION, status), (m.ABRIDGED, _WORD(1))):
+    reports = {m.EVALUATION: status} | ({m.STATE: y, m.ABRIDGED: _WORD(int(place == m.CALLS))} if place else {})
+    for index, value in reports.items():
         builder.store(value, builder.gep(n, [_WORD(index)]))
     builder.ret(_WORD(0))
     return str(builder.module)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.routines import symbols
 from flexclear.dynamics.routines.calls import (
     MODES,
     RATES,
@@ -19,14 +18,14 @@ from flexclear.dynamics.routines.calls import (
     STATE,
     CallList,
     Cell,
-    Indexed,
     Span,
     inline,
     parted,
 )
-from flexclear.dynamics.routines.symbols import leaves, new_tape, rebuilt
+from flexclear.dynamics.specialise import symbols
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.specialise.code import Program
+from flexclear.dynamics.specialise.symbols import Indexed, leaves, new_tape, rebuilt
 from flexclear.dynamics.specialise.tape import FLOAT, INTEGER
 
 
@@ -47,6 +46,11 @@ class OneTape(CallList):
         self._stored |= {cell.key: (cell, value) for cell, value in zip(into or (), leaves(first), strict=True)}
         return rest
 
+    @staticmethod
+    def located(numbers: Sequence[Any], stride: int = 1) -> list[Any]:
+        """Return the numbers."""
+        return list(numbers)
+
     def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
         """Record a loop, and return the state after it."""
 
@@ -62,6 +66,8 @@ class OneTape(CallList):
             return Indexed(lambda index: self._tape.write(FLOAT, "load", array, first + index))
         if cell.key in self._stored:
             return self._stored[cell.key][1]
+        if cell.array == RESULTS:
+            return 0.0
         if cell.array == MODES:
             return self._tape.write(INTEGER, "load", "n", self._tape.write(INTEGER, "load", "n", m.MODE) + cell.index)
         return self._tape.write(FLOAT, "load", *_place(cell))
@@ -69,7 +75,8 @@ class OneTape(CallList):
     @property
     def program(self) -> Program:
         """The program of all calls."""
-        stores = [(*_place(cell), value) for cell, value in self._stored.values()]
+        kept = [one for one in self._stored.values() if one[0].array != RESULTS or one[0].index == 0]
+        stores = [(*_place(cell), value) for cell, value in kept]
         return Program(self._tape.block, [*stores, ("n", m.ABRIDGED, 1)])
 
 

@@ -34,9 +34,11 @@ from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.coordinates import joint_coordinates, label
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.dynamics.run.evaluation.matrices import Matrices
 from flexclear.dynamics.run.evaluation.observation import observe
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.dynamics.vectors import ZERO, Wrench
 from flexclear.scene.drives import JointDrive, PathDrive
 from flexclear.scene.laws import Constant
 from flexclear.scene.loads import JointForce
@@ -139,13 +141,14 @@ def enough(engine: Engine, start: np.ndarray) -> list[str]:
     if not names:
         return []
     closure_rows.evaluate(engine, start, engine.start)
-    free = null_space(_closure_jacobian(engine), rcond=RANK_TOLERANCE)
+    found = Matrices(engine, every_row=True)
+    free = null_space(found.jacobian, rcond=RANK_TOLERANCE)
     known = [k for k, name in enumerate(drives) if name.partition(".")[0] in requested]
     held = [k for k in range(len(drives)) if k not in known]
     if held:  # other drives continue as they do
         free = free @ null_space(free[[nv + k for k in held]], rcond=RANK_TOLERANCE)
     of_path = free[[nv + k for k in known]]
-    of_actuators = np.array([_rate(engine, scene, name) @ free for name in names])
+    of_actuators = np.array([_rate(found, engine, scene, name) @ free for name in names])
     where = f"[drive.{next(iter(requested))}.actuators]"
     rank, both = _rank(of_actuators), _rank(np.vstack([of_actuators, of_path]))
     if both > rank:
@@ -171,30 +174,7 @@ def _rank(matrix: np.ndarray) -> int:
     return int(np.sum(values > RANK_TOLERANCE * max(values.max(initial=0.0), 1e-300)))
 
 
-def _closure_jacobian(engine: Engine) -> np.ndarray:
-    """Return the rates of all closure rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
-    model, columns = engine.model, _columns(engine)
-    rows = engine.view(m.ROWS.at).reshape(-1, m.ROWS.size)
-    J = np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), model.nv + len(model.drives)))
-    closures, entries, support = (model.arrays.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
-    for c in closures:
-        mine = slice(c["row0"], c["row0"] + c["n_rows"])
-        for slot, col, sign, part in entries[c["entry0"] : c["entry0"] + c["n_entries"]]:
-            wrenches = rows[mine] if not part else rows[[len(J) + c["coupling"]]]
-            J[mine, support["coordinate"][c["support0"] + slot]] += sign * wrenches @ columns[col]
-    for c, d, col, sign, part in model.arrays.table(m.KNOWN_ENTRIES):
-        mine = slice(closures["row0"][c], closures["row0"][c] + closures["n_rows"][c])
-        wrenches = rows[mine] if not part else rows[[len(J) + closures["coupling"][c]]]
-        J[mine, model.nv + d] += sign * wrenches @ columns[col]
-    return J
-
-
-def _columns(engine: Engine) -> np.ndarray:
-    """Return the twists of all columns after an evaluation, shape (columns, 6)."""
-    return engine.view(m.COLUMNS.at).reshape(-1, m.COLUMNS.size)
-
-
-def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
+def _rate(found: Matrices, engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
     """Return the rate of an actuator's coordinate per speed of the mechanism, free ones first, then prescribed."""
     model, (joint, k, coordinate) = engine.model, _coordinate(scene, actuator)
     rates = np.zeros(model.nv + len(model.drives))
@@ -203,20 +183,9 @@ def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
             rates[model.numbering.coordinates[i][link.joint.positions.index(k)]] = link.joint.sign
             return rates
     row = model.arrays.table(m.CLOSURES)[[closure.name for closure in model.closures].index(joint)]
-    a, b = int(row["site_a"]), int(row["site_b"])
-    wrench, columns = _unit_wrench(engine.table(m.SITE_FRAMES), a, b, coordinate), _columns(engine)
-    for site, sign in ((b, 1.0), (a, -1.0)):
-        for c, col in model.numbering.route(site):
-            rates[c] += sign * wrench @ columns[col]
-    return rates
-
-
-def _unit_wrench(sites: np.ndarray, a: int, b: int, coordinate: Coordinate) -> np.ndarray:
-    """Return moment about the kernels' origin and force of a unit force along a coordinate, shape (6,)."""
-    along = sites["axes"][b if coordinate.side else a][:, coordinate.axis]
-    if coordinate.turning:
-        return np.concatenate([along, np.zeros(3)])
-    return np.concatenate([np.cross(sites["origin"][b], along), along])
+    a, b = (found.mechanism.frames[row[site]] for site in ("site_a", "site_b"))
+    along = found.motion(b if coordinate.side else a).R_WB.column(coordinate.axis)
+    return found.moved_by(a, b, [Wrench(along, ZERO) if coordinate.turning else Wrench(ZERO, along)])[0]
 
 
 def _with_actuators_as_loads(
@@ -252,8 +221,9 @@ def _least_forces(
     for t, state, force in zip(time, seen.state, forces, strict=True):
         engine.select_pieces_after(min(t + 1e-9 * (time[-1] - time[0]), 0.5 * (time[-1] + time[-2])))
         closure_rows.evaluate(engine, state, float(t))
-        free = null_space(_closure_jacobian(engine), rcond=RANK_TOLERANCE)
-        rates = np.array([_rate(engine, scene, name) @ free for name in names])
+        found = Matrices(engine, every_row=True)
+        free = null_space(found.jacobian, rcond=RANK_TOLERANCE)
+        rates = np.array([_rate(found, engine, scene, name) @ free for name in names])
         T = rates @ np.linalg.pinv(rates[own], rcond=RANK_TOLERANCE)
         least.append(T @ np.linalg.solve(T.T @ T, force))
     return np.array(least)

@@ -1,6 +1,6 @@
-"""Dual numbers with changes along several directions: kernels run on them give exact derivatives without a compiler.
+"""Dual numbers with changes along several directions: routines run on them give exact derivatives without a compiler.
 
-Every number that depends on a changed one carries its derivatives. Kernels run in Python (`plain`), so iterations are
+Every number that depends on a changed one carries its derivatives. Routines run in Python, so iterations are
 differentiated too, and no mechanism is too large. A run takes some microseconds per operation for all directions
 together; where one mechanism is differentiated thousands of times, compiled tangents (`derivative`) are faster.
 
@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.dynamics.specialise.plain import FUNCTIONS, Plain
 from flexclear.dynamics.specialise.rules import RULES
 
 
@@ -48,10 +47,10 @@ class Dual:
     def __rsub__(self, other: Any) -> Dual:
         return Dual(other - self.value, -self.change)
 
-    def __mul__(self, other: Any) -> Dual:
+    def __mul__(self, other: Any) -> Any:
         if isinstance(other, Dual):
             return Dual(self.value * other.value, self.change * other.value + other.change * self.value)
-        return Dual(self.value * other, self.change * other)
+        return NotImplemented if isinstance(other, tuple) else Dual(self.value * other, self.change * other)
 
     __rmul__ = __mul__
 
@@ -102,6 +101,11 @@ class _Numbers:
         return np.power(*arguments) if operation == "pow" else getattr(np, operation)(*arguments)
 
 
+def function_of(name: str, *arguments: Any) -> Any:
+    """Return NumPy's function of this name of numbers."""
+    return _apply(name, getattr(np, name), *arguments)
+
+
 def _apply(name: str, function: Callable, *arguments: Any) -> Any:
     """Return a function of numbers, with changes where an argument has some."""
     if not any(isinstance(a, Dual) for a in arguments):
@@ -111,17 +115,6 @@ def _apply(name: str, function: Callable, *arguments: Any) -> Any:
     changes = tuple(a.change if isinstance(a, Dual) else 0.0 for a in arguments)
     change = RULES[name](_Numbers, result, values, changes)
     return Dual(result, change) if isinstance(change, np.ndarray) else result
-
-
-def _function(name: str) -> Callable:
-    return lambda *arguments: _apply(name, getattr(np, name), *arguments)
-
-
-def plain(kernel: Any) -> Callable:
-    """Return the kernel as a function of Python on dual numbers."""
-    assert set(FUNCTIONS) <= RULES.keys()
-    function: Callable = Plain(_function, lambda a, b: b if b > a else a, lambda a, b: b if b < a else a)(kernel)
-    return function
 
 
 def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:
@@ -135,3 +128,13 @@ def changes(numbers: Iterable[Any], directions: int) -> np.ndarray:
     nothing = np.zeros(directions)
     rows = [number.change if isinstance(number, Dual) else nothing for number in numbers]
     return np.array(rows).reshape(len(rows), directions).T.copy()
+
+
+def product(matrix: Any, vector: Iterable[Any]) -> list[Any]:
+    """Return the product of a matrix of plain numbers with numbers that may carry changes."""
+    given = list(vector)
+    values = list(matrix @ np.array([value(one) for one in given], dtype=matrix.dtype))
+    directions = next((len(one.change) for one in given if isinstance(one, Dual)), 0)
+    if not directions:
+        return values
+    return [Dual(*one) for one in zip(values, matrix @ changes(given, directions).T, strict=True)]

@@ -1,9 +1,7 @@
 """Right-hand side of one topology as specialised code: no tables, no loops, only registers and the stack as storage.
 
-Each topology has two versions. The steps call straight code of routines (`mechanics.of_topology`), which stores only
-what they read (`mechanics.evaluation.evaluated`); n[ABRIDGED] reports that. LLVM optimises this version. The other one
-is that of kernels and stores all results of an evaluation. It is called some hundreds of times in a run, and LLVM
-assembles it without optimisation, in a tenth of the time.
+The steps call straight code of routines (`mechanics.of_topology`), which stores only what they read
+(`mechanics.evaluation.evaluated`); n[ABRIDGED] reports that.
 """
 
 from __future__ import annotations
@@ -16,55 +14,31 @@ from llvmlite import ir
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.specialise.code import Emitter, Program, loads
-from flexclear.dynamics.specialise.tape import FLOAT, INTEGER, same
-from flexclear.dynamics.specialise.trace import Memory, Trace
 
-#: operations beyond which specialised code takes longer to build than kernels and is hardly faster: it no longer fits
-#: the processor's first caches; beyond which lists of calls are faster; and the limit for tangents, which have no list
+#: operations beyond which straight code with the same bits in each lane takes too long to build; beyond which lists of
+#: calls are faster; and the limit for tangents, which have no list
 LONGEST, LONGEST_STRAIGHT, LONGEST_DIFFERENTIATED = 50_000, 20_000, 80_000
-#: integers of n that are stored
-REPORTS = {m.EVALUATION, m.ABRIDGED}
 _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
 #: name of the function
 NAME = "specialised"
 
 
-def program(kernel: Callable, topology: topologies.Topology, longest: int = 0, *, describes: bool = False) -> Program:
-    """Return the program of kernel rates(h, f, w, n, y, dy) for a topology, which stores all of w.
-
-    describes: the kernel is describe(h, f, w, n), for an evaluated state.  Raises UnsuitedError when it has more than
-    `longest` operations, or `LONGEST` for 0.
-    """
-    h, trace = topologies.header(topology), Trace(longest or LONGEST)
-    w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
-    ground = topologies.ground(h)
-    w.values.update(ground)
-    trace.plain(kernel)(
-        h, f, w, n, *(() if describes else (topologies.start(topologies.STATE), topologies.start(topologies.RATES)))
-    )
-    changed = [(index, v) for index, v in w.values.items() if index not in ground or not same(v, ground[index])]
-    reports = [("n", index, v) for index, v in n.values.items() if index in REPORTS]
-    return Program(trace.tape.block, [*(("w", *one) for one in changed), *reports])
-
-
-def llvm_text(tape: Program, *, exact: bool = False, describes: bool = False) -> str:
+def llvm_text(tape: Program, *, exact: bool = False) -> str:
     """Return the LLVM text of a C function that runs a program.
 
-    It is evaluate(h, f, w, n, t, y, dy), which first evaluates the laws at time t, or, to describe, describe(h, f, w,
-    n).  exact: True for the results of each lane of `batched`, bit by bit; sums in any order are faster by a sixth.
+    It is evaluate(h, f, w, n, t, y, dy), which first evaluates the laws at time t.  exact: True for the results of each
+    lane of `batched`, bit by bit; sums in any order are faster by a sixth.
     """
     module = ir.Module(NAME)
     tables = [_INTEGER.as_pointer(), _FLOAT.as_pointer(), _FLOAT.as_pointer(), _INTEGER.as_pointer()]
-    more = [] if describes else [_FLOAT, _INTEGER, _INTEGER]
-    function = ir.Function(module, ir.FunctionType(_INTEGER, [*tables, *more]), NAME)
+    function = ir.Function(module, ir.FunctionType(_INTEGER, [*tables, _FLOAT, _INTEGER, _INTEGER]), NAME)
     arrays, given = function.args[:4], function.args[5:]
     for array in arrays:
         array.add_attribute("noalias")
     builder = ir.IRBuilder(function.append_basic_block())
-    if not describes:
-        address = builder.load(builder.gep(arrays[0], [_INTEGER(m.PRESCRIBE)]))
-        laws = ir.FunctionType(_INTEGER, [*tables, _FLOAT]).as_pointer()
-        builder.call(builder.inttoptr(address, laws), function.args[:5])
+    address = builder.load(builder.gep(arrays[0], [_INTEGER(m.PRESCRIBE)]))
+    laws = ir.FunctionType(_INTEGER, [*tables, _FLOAT]).as_pointer()
+    builder.call(builder.inttoptr(address, laws), function.args[:5])
     Emitter(builder, tape, places(builder, tape, [[*arrays, *given]]), exact=exact).emit()
     builder.ret(_INTEGER(0))
     return str(module)
@@ -73,8 +47,7 @@ def llvm_text(tape: Program, *, exact: bool = False, describes: bool = False) ->
 def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     """Return the function `where` that gives the address of an array's element in a lane, from offsets looked up once.
 
-    given: h, f, w, n, y and dy of each lane; for a tangent also offsets of its changes (`batched.differentiated`); for
-    `describes` the arrays only.
+    given: h, f, w, n, y and dy of each lane; for a tangent also offsets of its changes (`batched.differentiated`).
     """
     begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
     places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
@@ -83,9 +56,8 @@ def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     for lane, (h, f, w, n, *states) in enumerate(given):
         arrays.append({"h": h, "f": f, "w": w, "n": n})
         reported, changes = {-1: _INTEGER(0)}, states[2:]
-        if states:
-            builder.store(states[0], builder.gep(n, [_INTEGER(m.STATE)]))
-            reported |= {topologies.STATE: states[0], topologies.RATES: states[1]}
+        builder.store(states[0], builder.gep(n, [_INTEGER(m.STATE)]))
+        reported |= {topologies.STATE: states[0], topologies.RATES: states[1]}
         if changes:
             arrays[lane] |= {"df": builder.gep(f, [changes[0]]), "dw": builder.gep(w, [changes[1]])}
             reported |= {topologies.STATE_CHANGE: changes[2], topologies.RATES_CHANGE: changes[3]}

@@ -7,12 +7,14 @@ any number of pieces of laws.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model.arrays import Arrays
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.model.arrays import Arrays
 
 #: sizes of the header, then the rows of each table of h
 Topology = tuple[tuple[int, ...], ...]
@@ -39,15 +41,6 @@ def topology_of(arrays: Arrays, h: np.ndarray) -> Topology:
     return (tuple(sizes.tolist()), *tables)
 
 
-def header(topology: Topology) -> list[int]:
-    """Return the array h of a topology, with work array numbers in place of all offsets in f and w."""
-    h = [*topology[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
-    for table, rows in zip(m.TABLES["h"], topology[1:], strict=True):
-        h[table.at] = len(h)
-        h += rows
-    return h
-
-
 def split(index: Any) -> tuple[Any, Any]:
     """Return the header index of a work array, -1 for h, f, w or n itself, and the position in the array.
 
@@ -59,17 +52,6 @@ def split(index: Any) -> tuple[Any, Any]:
 def start(stretch: int) -> int:
     """Return the index of the first entry of a work array."""
     return (stretch + 1) << STRETCH
-
-
-def ground(h: list[int]) -> dict[int, Any]:
-    """Return the entries of w for the ground, which no kernel changes: its frame, at rest, and zero inertia."""
-    frame, own = h[m.LINK_FRAMES.at], h[m.OWN.at]
-    axes = range(frame + m.FRAME.axes, frame + m.FRAME.axes + 9, 4)
-    return {
-        **{index: 0.0 for index in range(frame, frame + m.FRAME.size)},
-        **{index: 1.0 for index in axes},
-        **{index: 0.0 for index in range(own, own + m.OWN.size)},
-    }
 
 
 def based(index: Any) -> tuple[int, Any] | None:

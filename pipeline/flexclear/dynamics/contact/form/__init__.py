@@ -1,8 +1,8 @@
-"""Compiled forms of normal forces; laws that share a form differ in numbers only.
+"""Forms of normal forces; laws that share a form differ in numbers only.
 
-Each module has the kernels ``force(depth, rate, impact_rate, law) -> (elastic, damping)``, with a sum >= 0, and
-``stored(depth, law)``, and the function ``depth(force, law)``, the inverse of the elastic force; law has the fields of
-`contact.law.Numbers`.
+Each module has ``force(depth, rate, impact_rate, law) -> (elastic, damping)``, with a sum >= 0, and
+``stored(depth, law)``, of numbers that may be symbols; and ``depth(force, law)``, the inverse of the elastic force. law
+has the fields of `contact.law.Numbers`.
 """
 
 from __future__ import annotations

@@ -6,16 +6,15 @@ from collections.abc import Callable
 from typing import Any
 
 from flexclear.dynamics.contact.restitution import root
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import larger
 
 
 def damped(elastic: Callable) -> Callable:
     """Build `force` of a form whose damping is the law's `damping` times elastic(depth, law) times rate/impact_rate."""
 
-    @kernel
-    def force(depth, rate, impact_rate, law):
+    def force(depth: Any, rate: Any, impact_rate: Any, law: Any) -> tuple[Any, Any]:
         size = elastic(depth, law)
-        return size, max(-size, size * (law.damping * rate / impact_rate))
+        return size, larger(-size, size * (law.damping * rate / impact_rate))
 
     return force
 

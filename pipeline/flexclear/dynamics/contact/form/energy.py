@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-
-from flexclear.dynamics.kernels import kernel
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(20)
 #: places in an interval of length 1, and weights: Gauss's formula in the third root of the penetration, which
@@ -17,13 +16,12 @@ NODES = tuple(
 
 
 def integral(force: Callable) -> Callable:
-    """Build the kernel (start, end, law) of the integral of force(depth, law)."""
+    """Build the function (start, end, law) of the integral of force(depth, law)."""
 
-    @kernel
-    def over(start, end, law):
-        total = 0.0
+    def over(start: Any, end: Any, law: Any) -> Any:
+        total: Any = 0.0
         for place, weight in NODES:
-            total += weight * force(start + place * (end - start), law)
+            total = total + weight * force(start + place * (end - start), law)
         return total * (end - start)
 
     return over
@@ -33,8 +31,7 @@ def stored_by(force: Callable) -> Callable:
     """Build `stored` of a form from its elastic force(depth, law)."""
     over = integral(force)
 
-    @kernel
-    def stored(depth, law):
+    def stored(depth: Any, law: Any) -> Any:
         return over(0.0, depth, law)
 
     return stored

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from flexclear.dynamics.contact.expression import composed
 from flexclear.dynamics.contact.form.damped import inverse
 from flexclear.dynamics.contact.form.energy import integral, stored_by
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import larger, smaller
 
 #: place of the first kink of the elastic force among the law's values
 KINKS = 10
@@ -27,20 +27,17 @@ def form_of(kind: str) -> Form:
     bends = list[Callable]()
     whole = composed(kind, bends)
 
-    @kernel
-    def force(depth, rate, impact_rate, law):
+    def force(depth: Any, rate: Any, impact_rate: Any, law: Any) -> tuple[Any, Any]:
         elastic = whole(depth, 0.0, impact_rate, law.values)
-        return elastic, max(-elastic, whole(depth, rate, impact_rate, law.values) - elastic)
+        return elastic, larger(-elastic, whole(depth, rate, impact_rate, law.values) - elastic)
 
-    @kernel
-    def at_rest(depth, law):
+    def at_rest(depth: Any, law: Any) -> Any:
         return whole(depth, 0.0, 1.0, law.values)
 
     up_to = integral(at_rest)
 
-    @kernel
-    def in_pieces(depth, law):
-        first, second = min(depth, law.values[KINKS]), min(depth, law.values[KINKS + 1])
+    def in_pieces(depth: Any, law: Any) -> Any:
+        first, second = smaller(depth, law.values[KINKS]), smaller(depth, law.values[KINKS + 1])
         return up_to(0.0, first, law) + up_to(first, second, law) + up_to(second, depth, law)
 
     return Form(force, in_pieces if bends else stored_by(at_rest), inverse(at_rest))

@@ -6,17 +6,21 @@ Source: Hunt & Crossley (1975), J. Applied Mechanics 42, 440-445.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from flexclear.dynamics.contact.form.elastic import depth, power, stored
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import larger
+
+if TYPE_CHECKING:
+    from flexclear.dynamics.contact.law import Numbers
 
 __all__ = ["depth", "force", "stored"]
 
 
-@kernel
-def force(depth, rate, impact_rate, law):
+def force(depth: Any, rate: Any, impact_rate: Any, law: Numbers) -> tuple[Any, Any]:
     """Return elastic and damping force [N], sum >= 0; impact_rate: `rate` at the start of this contact [m/s], > 0.
 
     The law's damping is a.
     """
     elastic = law.stiffness * power(depth, law.exponent)
-    return elastic, max(-elastic, elastic * (law.damping * rate / impact_rate))
+    return elastic, larger(-elastic, elastic * (law.damping * rate / impact_rate))

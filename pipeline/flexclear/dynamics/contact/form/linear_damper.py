@@ -6,23 +6,21 @@ would begin to pull, while the surfaces still overlap; the energy then left in t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import larger
 
 if TYPE_CHECKING:
     from flexclear.dynamics.contact.law import Numbers
 
 
-@kernel
-def force(depth, rate, impact_rate, law):
+def force(depth: Any, rate: Any, impact_rate: Any, law: Numbers) -> tuple[Any, Any]:
     """Return elastic and damping force [N], sum >= 0; the law's damping is C."""
     elastic = law.stiffness * depth
-    return elastic, max(-elastic, law.damping * rate)
+    return elastic, larger(-elastic, law.damping * rate)
 
 
-@kernel
-def stored(depth, law):
+def stored(depth: Any, law: Numbers) -> Any:
     """Return the energy [J] that the spring stores."""
     return 0.5 * law.stiffness * depth * depth
 

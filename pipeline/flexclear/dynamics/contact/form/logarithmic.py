@@ -8,12 +8,12 @@ Source: Chatzigeorgiou (2013), IEEE Communications Letters 17, 1505-1508, of Lam
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexclear.dynamics.contact.form.damped import damped
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import branch, exp, log, smaller, sqrt
 
 if TYPE_CHECKING:
     from flexclear.dynamics.contact.law import Numbers
@@ -23,34 +23,32 @@ LIMIT = float(np.log(2.0))
 LIMIT_DEPTH = 0.5 * (1.0 + LIMIT)
 
 
-@kernel
-def exponent(ratio):
+def exponent(ratio: Any) -> Any:
     """Return u for a compression over the largest, at most LIMIT_DEPTH."""
-    level = -np.log(ratio)
-    u = np.sqrt(2.0 * level) + 0.8 * level
+    level = -log(ratio)
+    u = sqrt(2.0 * level) + 0.8 * level
     for _ in range(4):
-        u = u - (u - np.log(1.0 + u) - level) * (1.0 + u) / u
+        u = u - (u - log(1.0 + u) - level) * (1.0 + u) / u
     return u
 
 
-@kernel
-def elastic(depth, law):
+def elastic(depth: Any, law: Any) -> Any:
     """Return the elastic force [N]; values: a force [N], and the largest compression [m], which is there."""
-    if depth <= 0.0:
-        return 0.0
-    ratio = depth / law.values[1]
-    if ratio > LIMIT_DEPTH:
-        return law.values[0] * (0.5 + (ratio - LIMIT_DEPTH) / LIMIT)
-    return law.values[0] * np.exp(-exponent(ratio))
+    force, ratio = law.values[0], depth / law.values[1]
+
+    def loaded() -> Any:
+        beyond = 0.5 + (ratio - LIMIT_DEPTH) / LIMIT
+        return branch(ratio > LIMIT_DEPTH, lambda: force * beyond, lambda: force * exp(-exponent(ratio)))
+
+    return branch(depth > 0.0, loaded, lambda: 0.0)
 
 
 force = damped(elastic)
 
 
-@kernel
-def stored(depth, law):
+def stored(depth: Any, law: Any) -> Any:
     """Return the stored energy [J]."""
-    ratio = min(depth / law.values[1], LIMIT_DEPTH)
+    ratio = smaller(depth / law.values[1], LIMIT_DEPTH)
     y, over = elastic(ratio * law.values[1], law) / law.values[0], depth / law.values[1] - ratio
     return law.values[1] * law.values[0] * (0.5 * y * ratio - 0.25 * y * y + over * (0.5 + 0.5 * over / LIMIT))
 

@@ -9,14 +9,15 @@ Source: Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO ASI 103, 57-8
 
 from __future__ import annotations
 
+from typing import Any
+
 from flexclear.dynamics.contact.friction.law import Friction, sliding
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import larger, smaller
 
 
-@kernel
-def coefficient(speed, p):
+def coefficient(speed: Any, p: Any) -> Any:
     """Return mu [-] at the sliding speed [m/s] >= 0; p = (mu_d, v_0, v_1, -, -, -)."""
-    return p[0] * min(1.0, max(0.0, (speed - p[1]) / (p[2] - p[1])))
+    return p[0] * smaller(1.0, larger(0.0, (speed - p[1]) / (p[2] - p[1])))
 
 
 LAW = Friction(

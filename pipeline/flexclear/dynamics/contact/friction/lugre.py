@@ -15,42 +15,41 @@ Source: Canudas de Wit, Olsson, Astrom & Lischinsky (1995), IEEE Trans. Automati
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
 from flexclear.dynamics.contact.friction.law import Friction
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import add, dot, scale, sub
+from flexclear.dynamics.specialise.symbols import branch, exp, larger, sqrt
+from flexclear.dynamics.vectors import Vector, dot
 
 
-@kernel
-def damping_share(elastic, damping, limit):
+def damping_share(elastic: Vector, damping: Vector, limit: Any) -> Any:
     """Return the largest k in [0, 1] with |elastic + k damping| <= limit, given |elastic| <= limit."""
-    total = add(elastic, damping)
-    if dot(total, total) <= limit * limit:
-        return 1.0
-    a, b, c = dot(damping, damping), dot(elastic, damping), dot(elastic, elastic) - limit * limit
-    if a == 0.0:
-        return 0.0  # rounding exceeds the limit
-    return max(0.0, (np.sqrt(max(0.0, b * b - a * c)) - b) / a)
+    total = elastic + damping
+
+    def part() -> Any:
+        a, b, c = dot(damping, damping), dot(elastic, damping), dot(elastic, elastic) - limit * limit
+        # a = 0: rounding exceeds the limit
+        return branch(a == 0.0, lambda: 0.0, lambda: larger(0.0, (sqrt(larger(0.0, b * b - a * c)) - b) / a))
+
+    return branch(dot(total, total) <= limit * limit, lambda: 1.0, part)
 
 
-@kernel
-def traction(z, slip, f_n, p):
+def traction(z: Vector, slip: Vector, f_n: Any, p: Any) -> tuple[Vector, Any, Any, Vector]:
     """Return force, loss, stored energy and rate of the bristles.
 
     p: mu_s, mu_d [-], v_S [m/s], sigma_0 [1/m], sigma_1, sigma_2 [s/m].
     """
     square = dot(slip, slip)
-    fading = np.exp(-square / (p[2] * p[2]))
-    relaxing = p[3] * np.sqrt(square) / (p[1] + (p[0] - p[1]) * fading)
-    z_rate = sub(slip, scale(relaxing, z))
-    elastic = scale(p[3], z)
-    damping = add(scale(p[4] * fading, z_rate), scale(p[5], slip))
+    fading = exp(-square / (p[2] * p[2]))
+    relaxing = p[3] * sqrt(square) / (p[1] + (p[0] - p[1]) * fading)
+    z_rate = slip - relaxing * z
+    elastic = p[3] * z
+    damping = p[4] * fading * z_rate + p[5] * slip
     share = damping_share(elastic, damping, p[0])
-    force = scale(-f_n, add(elastic, scale(share, damping)))
+    force = -f_n * (elastic + share * damping)
     # sigma_0 z . v less the rate of the stored energy at constant F_n, plus the loss of the damping
     loss = f_n * (relaxing * p[3] * dot(z, z) + share * dot(damping, slip))
-    return force, max(0.0, loss), 0.5 * p[3] * f_n * dot(z, z), z_rate
+    return force, larger(0.0, loss), 0.5 * p[3] * f_n * dot(z, z), z_rate
 
 
 LAW = Friction(

@@ -12,23 +12,27 @@ Source: Wang & Wang (2019), eqs. (27)-(29).
 
 from __future__ import annotations
 
+from typing import Any
+
 from flexclear.dynamics.contact.friction.law import Friction, sliding
-from flexclear.dynamics.kernels import kernel
+from flexclear.dynamics.specialise.symbols import branch
 
 
-@kernel
-def coefficient(speed, p):
+def coefficient(speed: Any, p: Any) -> Any:
     """Return mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d, -, -).
 
     Source: Wang & Wang (2019), eqs. (27), (28), (29).
     """
-    if speed >= p[3]:
-        return p[1]
-    if speed >= p[2]:
+
+    def rising() -> Any:
+        y = speed / p[2]
+        return 0.5 * p[0] * y * (3.0 - y * y)
+
+    def falling() -> Any:
         y = (speed - p[2]) / (p[3] - p[2])
         return p[0] + (p[1] - p[0]) * y * y * (3.0 - 2.0 * y)
-    y = speed / p[2]
-    return 0.5 * p[0] * y * (3.0 - y * y)
+
+    return branch(speed >= p[3], lambda: p[1], lambda: branch(speed >= p[2], falling, rising))
 
 
 LAW = Friction(

@@ -6,19 +6,19 @@ Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from flexclear.dynamics.contact.hertz import plane_stiffness, published
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import ZERO, axis, dot, scale
+from flexclear.dynamics.contact.surfaces.separation import Separation
+from flexclear.dynamics.vectors import ZERO, Matrix, Vector, dot
 from flexclear.scene.loose_joints import BallOnPlane
 
 
-@kernel
-def separation(axes, numbers, p, v):
-    """Return the same as `clearance_spherical.separation`; the normal points into the plane."""
-    z = axis(axes, 2)
+def separation(numbers: Any, R_WA: Matrix, p: Vector, v: Vector) -> Separation:
+    """Return the separation from the plane."""
+    z = R_WA.column(2)
     height = dot(z, p)
-    return height - numbers.radius, -dot(z, v), scale(-1.0, z), ZERO, scale(height, z)
+    return Separation(height - numbers.radius, -dot(z, v), -z, ZERO, height * z)
 
 
 stiffness = published({1.5: plane_stiffness})

@@ -1,7 +1,7 @@
 """Pin in a journal with clearance: a circle in a circle, in the plane normal to the journal's axis.
 
 Axial motion and tilt are constrained as by a planar joint (`held` in scene/loose_joints), with a force along the
-axis and moments across it at the pin's frame. The contact (`contact.forces`) acts in the middle of
+axis and moments across it at the pin's frame. The contact (`mechanics.contacts`) acts in the middle of
 the bearing, where the two frames are; over-long bearings, which tilting pins touch at both rims, are
 not modelled.
 
@@ -15,18 +15,18 @@ cylinders.
 
 from __future__ import annotations
 
+from typing import Any
+
 from flexclear.dynamics.contact import hertz
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import axis, dot, radial, scale, sub
+from flexclear.dynamics.contact.surfaces.separation import Separation, across, nested
+from flexclear.dynamics.vectors import Matrix, Vector
 from flexclear.scene.loose_joints import ClearanceRevolute
 
 
-@kernel
-def separation(axes, numbers, p, v):
-    """Return the same as `clearance_spherical.separation`, for the components of p and v across the journal's axis."""
-    z = axis(axes, 2)
-    distance, rate, normal, turning = radial(sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z)))
-    return numbers.clearance - distance, rate, normal, turning, p
+def separation(numbers: Any, R_WA: Matrix, p: Vector, v: Vector) -> Separation:
+    """Return the separation in the plane across the journal's axis z."""
+    z = R_WA.column(2)
+    return nested(numbers.clearance, across(z, p), across(z, v))._replace(offset=p)
 
 
 stiffness = hertz.published({1.0: hertz.cylinder_stiffness, 1.5: hertz.sphere_stiffness})

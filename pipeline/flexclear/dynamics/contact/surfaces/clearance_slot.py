@@ -10,26 +10,23 @@ Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
 from flexclear.dynamics.contact.hertz import cylinder_stiffness, half_width, plane_stiffness, published
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import axis, dot, radial, scale, sub
+from flexclear.dynamics.contact.surfaces.separation import Separation, across, nested
+from flexclear.dynamics.specialise.symbols import copysign, select
+from flexclear.dynamics.vectors import Matrix, Vector, dot
 from flexclear.scene.loose_joints import ClearanceSlot
 
 
-@kernel
-def separation(axes, numbers, p, v):
-    """Return the same as `clearance_spherical.separation`; shape[0]: half the length of the straight part [m]."""
-    x, z, half = axis(axes, 0), axis(axes, 2), numbers.shape[0]
-    across, across_rate = sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z))
+def separation(numbers: Any, R_WA: Matrix, p: Vector, v: Vector) -> Separation:
+    """Return the separation from the walls and ends; shape[0]: half the length of the straight part [m]."""
+    x, z, half = R_WA.column(0), R_WA.column(2), numbers.shape[0]
     along = dot(x, p)
-    if abs(along) <= half:
-        across, across_rate = sub(across, scale(along, x)), sub(across_rate, scale(dot(x, v), x))
-    else:
-        across = sub(across, scale(np.copysign(half, along), x))
-    distance, rate, normal, turning = radial(across, across_rate)
-    return numbers.clearance - distance, rate, normal, turning, across
+    between = abs(along) <= half
+    guided = select(between, along, copysign(half, along)) * x  # the centre line's nearest point
+    moving = select(between, dot(x, v), 0.0) * x
+    return nested(numbers.clearance, across(z, p) - guided, across(z, v) - moving)
 
 
 stiffness = published({1.0: cylinder_stiffness, 1.5: plane_stiffness})

@@ -1,29 +1,23 @@
 """Ball in a socket with clearance: the surfaces separate along the line of centres, in space.
 
-Only the contact (`contact.forces`) connects the bodies.
+Only the contact (`mechanics.contacts`) connects the bodies.
 Source: Wang & Wang (2019), eq. (26).
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from flexclear.dynamics.contact.hertz import published, relative_radius, sphere_stiffness
-from flexclear.dynamics.kernels import kernel
-from flexclear.dynamics.vectors import radial
+from flexclear.dynamics.contact.surfaces.separation import Separation, nested
+from flexclear.dynamics.vectors import Matrix, Vector
 from flexclear.scene.loose_joints import ClearanceSpherical
 
 
-@kernel
-def separation(axes, numbers, p, v):
-    """Return gap [m], rate of penetration, normal towards the socket, its rate, and the offset that closes the gap.
-
-    p, v: offset of the ball's centre from the socket's, and its rate as seen from the socket, world axes.
-    axes: of the socket, world axes.  numbers: of the contact (CONTACT_NUMBERS).
-    Source: Wang & Wang (2019), eqs. (19), (20), (21), (22).
-    """
-    distance, rate, normal, turning = radial(p, v)
-    return numbers.clearance - distance, rate, normal, turning, p
+def separation(numbers: Any, R_WA: Matrix, p: Vector, v: Vector) -> Separation:
+    """Return the separation along the line of centres; Wang & Wang (2019), eqs. (19), (20), (21), (22)."""
+    return nested(numbers.clearance, p, v)
 
 
 stiffness = published({1.5: sphere_stiffness})

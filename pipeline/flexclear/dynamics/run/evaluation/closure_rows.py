@@ -13,7 +13,6 @@ from flexclear.dynamics.model.mobility import INFINITE
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.numbering import Numbering
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.evaluation.tree_factor import mass_factor
 from flexclear.system.errors import SolverError
 
 #: length that scales rows and coordinates of the closures in condition numbers [m]
@@ -37,15 +36,15 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
 
     Without redundant rows there is no choice.
     """
-    everything = np.ones(len(engine.selected), dtype=bool)
     if not engine.mobility.redundant:
         return 1.0
-    engine.keep(everything)
-    engine.attempt(y, t)
-    spread = engine.rows(m.SPREAD)
-    columns, points = engine.table(m.COLUMNS), engine.table(m.SITE_FRAMES)["origin"]
-    lengths = selection.natural_lengths(engine.model, columns, points, mass_factor(engine))
-    scales = selection.row_scales(engine.model, spread, lengths)
+    from flexclear.dynamics.run.evaluation.matrices import Matrices  # here: it imports the compiler
+
+    engine.view(m.Y)[:] = y
+    engine.evaluate_laws(t)
+    found = Matrices(engine, every_row=True)
+    spread = found.dense({number: one.V for number, one in found.loops.found.items()})[:, : engine.model.nv]
+    scales = selection.row_scales(engine.model, spread, found.natural_lengths(found.factor))
     selected, ratio = selection.choose(spread, scales, engine.mobility.rank)
     engine.keep(selected)
     engine.view(m.ROW_SCALE)[: selected.sum()] = scales[selected] ** 2
@@ -105,7 +104,7 @@ def diagnosis(engine: Engine) -> str:
     """Return the condition number at the state evaluated last, and the joint whose closure is nearest to dependent."""
     if not engine.model.closures:
         return "no loop is closed"
-    J = scale_rows(engine.model, engine.h, engine.rows(m.JACOBIAN))
+    J = scale_rows(engine.model, engine.h, engine.jacobian)
     if not J.size:
         return "the closures constrain no free coordinate of the tree"
     if not np.isfinite(J).all():

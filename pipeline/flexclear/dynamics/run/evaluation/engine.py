@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,8 +12,8 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
+from flexclear.dynamics.compile.files import PART, interpreted
 from flexclear.dynamics.compile.functions import function, place
-from flexclear.dynamics.compile.sources import DESCRIBED, WHOLE
 from flexclear.dynamics.effects import scheme_of
 from flexclear.dynamics.equations.prescribed_motion import SHORTEST
 from flexclear.dynamics.integrate import METHODS
@@ -31,18 +32,20 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     address,
     call_list,
     equations,
+    evaluated_in_python,
+    lists_in_python,
     made,
 )
 from flexclear.scene.loads import SampledPid
 from flexclear.system.errors import InputError, SolverError, refuse
-from flexclear.system.progress import Progress
+from flexclear.system.progress import Progress, silent
 
+#: how engines are made of models, if not with compiled functions (`without_compiler`)
+MAKER: ContextVar[Callable[[Model, Mobility], Engine] | None] = ContextVar("maker", default=None)
 #: of effects: why a run stopped, in words
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
-#: selections of closure rows with specialised steps, per integration
+#: first selections of closure rows of an integration, whose steps are specialised; those of others run lists
 SELECTIONS = 4
-#: modes of a body up to which steps run on routines, whose code grows as their cube: 50 take seconds to compile
-MOST_MODES = 64
 #: without steps: no output times, no rows, no events
 NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 
@@ -68,11 +71,6 @@ class Engine:
     start: float
     end: float
     specialised: SpecialisedCode
-
-    @property
-    def has_specialised_code(self) -> bool:
-        """True when evaluations use code specialised for the topology."""
-        return "evaluate" not in self.entry.addresses
 
     @cached_property
     def breaks(self) -> np.ndarray:
@@ -138,24 +136,47 @@ class Engine:
             self.selected[:] = rows
             selection.write(self.model, self.h, self.selected)
         self.view(m.ROW_SCALE)[: len(rows)] = 0.0
-        self.connect()
+        self.h[m.EVALUATE] = 0
 
-    def connect(self) -> None:
-        """Connect the functions for the selected rows: specialised code or routines for the steps where they exist."""
+    def connect(self, progress: Progress = silent) -> None:
+        """Connect functions for the selected rows: lists of calls, and for steps specialised code where it exists."""
         rows, known = self.selected.tobytes(), self.specialised
-        alone = rows in known.rows
-        if self.has_specialised_code:
-            self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
-        self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
-        if not self.h[m.RATES]:
-            calls = call_list(self.model, self.h, known, rows)
+        if INTERPRETED:
+            return self._connect_python()
+        for where, at in self._lists.items():
+            calls = call_list(self.model, self.h, known, rows, progress, where)
+            self.h[at], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data
+        self.h[m.RATES], met = self.h[m.EVALUATE], rows in known.rows
+        if met and not (self._specialises(rows) and address(self.model, self.h, known, rows, progress)):
+            calls = call_list(self.model, self.h, known, rows, progress)
             self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
-        self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
+        elif met:
+            self.h[m.RATES] = known.addresses[rows]
+        self.n[m.TOGETHER] = bool(met and known.group and known.group.rows == rows)
+
+    def _specialises(self, rows: bytes) -> bool:
+        """Return True when steps for closure rows that the integration has met use specialised code, if that exists."""
+        return bool(self.specialised.rows.index(rows) < SELECTIONS or self.h[m.N_CHANGES])
+
+    @property
+    def _lists(self) -> dict[int, int]:
+        """Lists that compiled functions run besides the steps': their places in h, and those of their interpreters."""
+        size, method = self.model.arrays.size, self.method
+        used = {m.CLOSE: size(m.N_CLOSURES), m.MOVE: method.traits.retracts, m.SPRINGS: method.room.oscillations}
+        return {m.RECORD_CALLS: m.EVALUATE, **{where: m.RUN for where, needed in used.items() if needed}}
+
+    def _connect_python(self) -> None:
+        """Connect functions of Python in place of compiled lists."""
+        laws, places = interpreted[int(self.h[m.PRESCRIBE])], list(self._lists)[1:]
+        made = {where: evaluated_in_python(self.model, laws, where) for where in (m.RECORD_CALLS, m.CALLS)}
+        for at, one in zip((m.EVALUATE, m.RATES, m.RUN), (*made.values(), lists_in_python(self.model)), strict=True):
+            interpreted[id(one)], self.h[at] = one, id(one)
+        self.h[places] = 2 * PART * np.array(places, dtype=np.int64)
 
     @property
     def staged(self) -> bool:
         """True when the engine can step together with others."""
-        return bool(self.method.staged and self.has_specialised_code)
+        return bool(self.method.staged and not INTERPRETED)
 
     def settle(self, progress: Progress) -> None:
         """Let further steps use specialised code or routines for the selected rows, at a place together with others.
@@ -163,23 +184,17 @@ class Engine:
         The selections that the integration has met decide, so an interrupted integration continues with the same code
         as an uninterrupted one.
         """
-        specialised, rows, changes = self.specialised, self.selected.tobytes(), self.h[m.N_CHANGES]
+        specialised, rows = self.specialised, self.selected.tobytes()
         if not INTERPRETED:
             if specialised.place is not None and specialised.group is None and self.staged:
                 where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
                 specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
-            few = len(specialised.rows) < SELECTIONS and self.model.arrays.size(m.MOST_MODES) <= MOST_MODES
-            if rows not in specialised.rows and (few or changes):
+            if rows not in specialised.rows:
                 specialised.rows.append(rows)
-            for met in specialised.rows:
-                if not address(self.model, self.h, specialised, met, progress=progress):
-                    call_list(self.model, self.h, specialised, met, progress)
-        self.connect()
+        self.connect(progress)
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row, in this thread."""
-        if self.has_specialised_code:
-            self.h[m.DESCRIBE] = address(self.model, self.h, self.specialised, self.selected.tobytes(), DESCRIBED)
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
         given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
         function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
@@ -196,8 +211,14 @@ class Engine:
         """Store the rate of the state in Y at time t in the first row of SLOPES; repeat: number of evaluations."""
         function("advance", self.entry.addresses["advance"])(*self._arrays(), t, repeat, *_record(*NO_RECORD))
 
+    def evaluate_laws(self, t: float) -> None:
+        """Store the values and rates of all laws at time t."""
+        function("prescribe", self.entry.addresses["prescribe"])(*self._arrays(), t)
+
     def _arrays(self) -> tuple[Any, ...]:
-        """Return the addresses of h, f, w and n for compiled functions."""
+        """Return the addresses of h, f, w and n for compiled functions, of which those called are connected."""
+        if not self.h[m.EVALUATE]:
+            self.connect()
         return place(self.h, np.int64), place(self.model.arrays.f), place(self.w), place(self.n, np.int64)
 
     def view(self, index: int) -> np.ndarray:
@@ -268,9 +289,10 @@ class Engine:
         diagonal = envelope["origin"] + np.arange(len(envelope))
         return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
 
-    def rows(self, stored: int) -> np.ndarray:
-        """Return JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
-        return selection.dense_rows(self.model, self.h, self.view(stored))
+    @property
+    def jacobian(self) -> np.ndarray:
+        """Jacobian of the closures at the state evaluated last, shape (selected rows, free coordinates)."""
+        return selection.dense_rows(self.model, self.h, self.view(m.JACOBIAN))
 
 
 def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[Any, ...]:
@@ -278,14 +300,22 @@ def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[
 
 
 def prepare(model: Model, progress: Progress) -> Engine:
-    """Return the engine of a model, its kernels compiled or loaded. Raise SolverError for an impossible start."""
+    """Return the engine of a model, its kernels compiled or loaded unless `MAKER` makes another.
+
+    Raises SolverError for an impossible start.
+    """
     refuse(start_errors(model.mechanism, final=False))
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
     refuse_singular(model, mobility)
+    if make := MAKER.get():
+        return make(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
-    return assemble(model, entry, METHODS[solver.integrator], mobility)
+    engine = assemble(model, entry, METHODS[solver.integrator], mobility)
+    if not mobility.redundant:
+        engine.connect(progress)
+    return engine
 
 
 def assemble(
@@ -297,7 +327,6 @@ def assemble(
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
     engine = kind(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
     engine.reset()
-    engine.connect()
     return engine
 
 

@@ -1,22 +1,24 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
 It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
-steps run a list of calls of routines, and all other evaluations are those of kernels. The topology alone decides, so
-that equal scenes give equal bytes.
+steps run a list of calls of routines. All other evaluations are lists that store what the record has. The topology
+alone decides, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
-from flexclear.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
+from flexclear.dynamics.compile.files import PART
+from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
@@ -31,8 +33,8 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 _making = Lock()
-#: addresses by parts, topology, name, lanes, whether exact and whether with changes, for all engines of the process
-_known: dict[tuple[Parts, Topology, str, int, bool, bool], int] = {}
+#: addresses by parts, topology, lanes, whether exact and whether with changes, for all engines of the process
+_known: dict[tuple[Parts, Topology, int, bool, bool], int] = {}
 
 
 @dataclass
@@ -42,8 +44,8 @@ class SpecialisedCode:
     exact: whether one state and several at once must give the same bits.
     place: for stepping together with others; by default each engine takes its own steps.
     group: the group at that place, for the closure rows of its code.
-    addresses: of the code, by the closure rows that it solves for and its name (`compile.sources`).
-    lists: of calls of routines, by closure rows, where no code is specialised.  running: these with their own results.
+    addresses: of the code, by the closure rows that it solves for.
+    lists: of calls of routines, by closure rows and their place in h.  running: these with their own results.
     rows: those for which the present integration has specialised steps.  They belong to one integration, since other
     integrations of this engine must not change a bit of this one.
     """
@@ -51,54 +53,83 @@ class SpecialisedCode:
     exact: bool = False
     place: Place | None = None
     group: LaneGroup | None = None
-    addresses: dict[tuple[bytes, str], int] = field(default_factory=dict)
-    lists: dict[bytes, LoadedList] = field(default_factory=dict)
-    running: dict[bytes, ListInstance] = field(default_factory=dict)
+    addresses: dict[bytes, int] = field(default_factory=dict)
+    lists: dict[tuple[bytes, int], LoadedList] = field(default_factory=dict)
+    running: dict[tuple[bytes, int], ListInstance] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
 
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
-    """Return the sources of a model's evaluation and description, by name, with all closure rows: the longest code.
-
-    Steps that solve for all rows are specialised as well; for redundant rows that is decided later.
-    """
-    if INTERPRETED:
-        return sources.kernels(model.parts)
-    topology = topology_of(model.arrays, model.arrays.h)
-    names = (WHOLE, DESCRIBED) if mobility.redundant else (WHOLE, DESCRIBED, SPECIALISED)
-    return {name: sources.specialised(model.parts, topology, name) for name in names}
+    """Return the source of specialised steps, by name; none with redundant closure rows, which await a selection."""
+    if INTERPRETED or mobility.redundant:
+        return {}
+    return {SPECIALISED: sources.specialised(model.parts, topology_of(model.arrays, model.arrays.h))}
 
 
-def address(
-    model: Model,
-    h: np.ndarray,
-    code: SpecialisedCode,
-    rows: bytes,
-    name: str = SPECIALISED,
-    progress: Progress = silent,
-) -> int:
-    """Return the address of specialised code for closure rows, by its name (`compile.sources`)."""
-    known = code.addresses
-    if (rows, name) not in known:
-        known[rows, name] = made(model, h, rows, progress, name, exact=code.exact)
-    return known[rows, name]
+def address(model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent) -> int:
+    """Return the address of specialised code for closure rows; 0 when there is none."""
+    if rows not in code.addresses:
+        code.addresses[rows] = made(model, h, rows, progress, exact=code.exact)
+    return code.addresses[rows]
 
 
 def call_list(
-    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
+    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent, where: int = m.CALLS
 ) -> ListInstance:
-    """Return the list of calls that evaluates a mechanism with closure rows (`mechanics`)."""
+    """Return the list of calls that evaluates a mechanism with closure rows (`mechanics`).
+
+    where: the place in h of its address, of which another list has another one (`mechanics.of_topology`).
+    """
     from flexclear.dynamics.mechanics.of_topology import list_of  # here: they import the compiler
     from flexclear.dynamics.routines.store import stored
 
-    if rows not in code.running:
-        if rows not in code.lists:
-            parts, topology = model.parts, topology_of(model.arrays, selected(model, h, rows))
+    of = rows, where
+    if of not in code.running:
+        if of not in code.lists:
+            given = model.parts, topology_of(model.arrays, selected(model, h, rows)), where
             with _making:
-                key = repr((parts, topology)).encode()
-                code.lists[rows] = stored(key, lambda: list_of(parts, topology), partial(progress, None))
-        code.running[rows] = code.lists[rows].instance(h)
-    return code.running[rows]
+                key, place = repr(given).encode(), where if where in (m.CALLS, m.RECORD_CALLS) else None
+                code.lists[of] = stored(key, lambda: list_of(*given), partial(progress, None), place)
+        code.running[of] = code.lists[of].instance(h)
+    return code.running[of]
+
+
+def lists_in_python(model: Model) -> Callable:
+    """Return a function that runs these lists in Python; `where` in h and the part of a list are its address there."""
+    from flexclear.dynamics.mechanics.of_topology import mechanism_of
+    from flexclear.dynamics.mechanics.responses import LISTS
+    from flexclear.dynamics.mechanics.tables import Tables
+    from flexclear.dynamics.routines.numbers import Numbers
+
+    known = list[Any]()
+
+    def run(
+        h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, y: int, dy: int, address: int
+    ) -> None:
+        where, part = divmod(int(address), 2 * PART)
+        calls = Numbers(h, f, w, n, y, dy)
+        if part == 0:
+            known[:] = [mechanism_of(Tables(model.parts, topology_of(model.arrays, h)))]
+        with calls.building():
+            found = LISTS[where][part // PART](known[0], calls, *known[1:])
+        known.append(found)
+        n[m.EVALUATION] = calls.report
+
+    return run
+
+
+def evaluated_in_python(model: Model, laws: Callable, where: int = m.RECORD_CALLS) -> Callable:
+    """Return a function that Python evaluates in place of a list; laws: evaluates the laws of time."""
+    from flexclear.dynamics.mechanics.of_topology import list_of
+    from flexclear.dynamics.routines.numbers import Numbers
+
+    def evaluate(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, y: int, dy: int) -> None:
+        laws(h, f, w, n, t)
+        calls = Numbers(h, f, w, n, int(y), int(dy))
+        list_of(model.parts, topology_of(model.arrays, h), where, calls)
+        n[m.EVALUATION], n[m.ABRIDGED], n[m.STATE] = calls.report, int(where == m.CALLS), y
+
+    return evaluate
 
 
 def selected(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
@@ -113,28 +144,24 @@ def made(
     h: np.ndarray,
     rows: bytes,
     progress: Progress,
-    name: str = SPECIALISED,
     lanes: int = 1,
     *,
     exact: bool = False,
 ) -> int:
     """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
-    parts, of_steps = model.parts, name == SPECIALISED
-    changes, exact = bool(h[m.N_CHANGES]) and of_steps, exact and of_steps
+    parts, changes = model.parts, bool(h[m.N_CHANGES])
     with _making:  # engines may run concurrently
         topology = topology_of(model.arrays, selected(model, h, rows))
-        key = (parts, topology, name, lanes, exact, changes)
+        key = (parts, topology, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
                 source = sources.batched(parts, topology, lanes)
             else:
                 source = (
-                    sources.tangent(parts, topology)
-                    if changes
-                    else sources.specialised(parts, topology, name, exact=exact)
+                    sources.tangent(parts, topology) if changes else sources.specialised(parts, topology, exact=exact)
                 )
             try:
-                _known[key] = functions.specialised(name, source, partial(progress, None))
+                _known[key] = functions.specialised(SPECIALISED, source, partial(progress, None))
             except UnsuitedError:
                 if changes:
                     raise

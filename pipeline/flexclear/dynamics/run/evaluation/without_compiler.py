@@ -5,8 +5,9 @@ An evaluation takes milliseconds, a thousand times as long as compiled code: eno
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,11 +15,13 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
-from flexclear.dynamics.effects import Parts
+from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.run.evaluation.engine import Engine, assemble
+from flexclear.dynamics.run.evaluation.engine import MAKER, Engine, assemble
+from flexclear.dynamics.run.evaluation.specialised_code import evaluated_in_python, lists_in_python
+from flexclear.system.progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,12 @@ class PythonEngine(Engine):
 
     entry: Uncompiled
 
-    def connect(self) -> None:
+    def connect(self, progress: Progress = silent) -> None:
         """Leave the header as it is."""
+
+    def evaluate_laws(self, t: float) -> None:
+        """Store the values and rates of all laws at time t."""
+        self.entry.kernels.laws(*self._numbers(), t)
 
     def evaluate(self, t: float, repeat: int = 1) -> None:
         """Store the rate of the state in Y at time t in the first row of SLOPES."""
@@ -56,13 +63,25 @@ class PythonEngine(Engine):
 def uncompiled(model: Model, mobility: Mobility) -> Engine:
     """Return an engine for the start of a model's run, without compilation."""
     method = METHODS[model.scene.solver.integrator]
-    return assemble(model, Uncompiled({}, _kernels(model.parts)), method, mobility, PythonEngine)
+    return assemble(model, Uncompiled({}, _kernels(model)), method, mobility, PythonEngine)
 
 
-@cache
-def _kernels(parts: Parts) -> SimpleNamespace:
-    calls = SimpleNamespace()
-    for name, kernel, source in sources.for_python(parts):
+@contextmanager
+def without_compiler() -> Iterator[None]:
+    """Let all engines that are prepared during the context be evaluated in Python."""
+    token = MAKER.set(uncompiled)
+    try:
+        yield
+    finally:
+        MAKER.reset(token)
+
+
+def _kernels(model: Model) -> SimpleNamespace:
+    calls = SimpleNamespace(evaluate=evaluated_in_python(model, lambda *given: calls.laws(*given)))
+    run = lists_in_python(model)
+    calls.correct = lambda *given: run(*given, 2 * PART * m.CLOSE)
+    calls.rates = lambda d, *given: calls.evaluate(d.h, d.f, d.w, d.n, *given)
+    for name, kernel, source in sources.for_python(model.parts):
         scope: dict[str, Any] = {"calls": calls}
         exec(source, scope)
         setattr(calls, name, scope[kernel])

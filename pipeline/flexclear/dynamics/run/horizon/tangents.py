@@ -118,7 +118,7 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
 
 def _with_room_for_changes(arrays: Arrays, f: np.ndarray, count: int) -> Arrays:
     """Return arrays with numbers f whose state has room for changes, in error groups of their own."""
-    given = Arrays(arrays.h, f, arrays.columns)
+    given = Arrays(arrays.h, f)
     tables = {table: given.rows(table) for table in (*m.TABLES["h"], *m.TABLES["f"])}
     groups, floors = tables[m.GROUPS], tables[m.FLOORS]
     tables[m.GROUPS] = np.concatenate([groups + k * len(floors) for k in range(1 + count)])
@@ -127,7 +127,7 @@ def _with_room_for_changes(arrays: Arrays, f: np.ndarray, count: int) -> Arrays:
     coarser[:, 2] *= LOOSER
     tables[m.FLOORS] = np.concatenate([floors, *[coarser] * count])
     own = (m.NY, m.N_GROUPS)
-    return pack({k: arrays.size(k) for k in range(m.ADDRESSES[0]) if k not in own}, tables, arrays.columns)
+    return pack({k: arrays.size(k) for k in range(m.ADDRESSES[0]) if k not in own}, tables)
 
 
 def _accumulated_variables(arrays: Arrays) -> np.ndarray:

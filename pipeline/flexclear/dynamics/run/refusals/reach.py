@@ -99,7 +99,7 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
     model, t, y = engine.model, float(engine.control[m.TIME]), engine.view(m.Y).copy()
     with restore_work_array(engine):
         engine.attempt(y, t)
-        J = closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN))
+        J = closure_rows.natural(model, engine.h, engine.jacobian)
         where = closure_rows.diagnosis(engine) if J.size else ""
     U, values, _ = np.linalg.svd(J) if J.size else (np.eye(1), np.ones(1), None)
     if not J.size or values[-1] > SINGULAR * values[0]:
@@ -146,7 +146,7 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     drive = _strongest_drive(engine) or model.drives[0]
     still[model.speeds] = 0.0
     engine.attempt(still, t)
-    U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN)))
+    U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.jacobian))
     pulled = engine.view(m.RESIDUAL_RATE)[selection.selected_indices(model, engine.h)]
     pulled = pulled / closure_rows.row_units(model, engine.h, model.length)
     if values[-1] > END_OF_REACH * values[0]:

@@ -148,7 +148,7 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
     def least(t: float) -> float:
         """Return the least singular value of all closures, whichever of them are selected."""
         sampler.attempt(t, made.states(np.array([t]))[0])
-        J = closure_rows.natural(engine.model, engine.h, engine.rows(m.JACOBIAN))
+        J = closure_rows.natural(engine.model, engine.h, engine.jacobian)
         return float(np.linalg.svd(J, compute_uv=False)[engine.mobility.rank - 1])
 
     saved = engine.selected.copy()
@@ -180,7 +180,7 @@ def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
     """Return the singular pose at a time. Raise SolverError when the mechanism comes to rest in it."""
     engine = sampler.engine
     sampler.attempt(t, made.states(np.array([t]))[0])
-    J = engine.rows(m.JACOBIAN)
+    J = engine.jacobian
     U, values, _ = np.linalg.svd(closure_rows.natural(engine.model, engine.h, J))
     lost = max(int(np.sum(values < VANISHED * values[0])), 1)
     reported = np.linalg.svd(closure_rows.scale_rows(engine.model, engine.h, J), compute_uv=False)

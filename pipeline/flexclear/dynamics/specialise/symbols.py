@@ -6,13 +6,12 @@ A condition on symbols is known only when the code runs. It is written `branch`,
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from flexclear.dynamics.specialise.dual import function_of
 from flexclear.dynamics.specialise.tape import FLOAT, Branch, Loop, Symbol, Tape
-from flexclear.dynamics.specialise.trace import Trace
 
 
 class UndecidableError(TypeError):
@@ -23,7 +22,7 @@ def _undecidable(condition: Symbol) -> bool:
     frame = sys._getframe(2)  # of the statement that asked for the truth of the condition
     raise UndecidableError(
         f"{frame.f_code.co_filename}:{frame.f_lineno}: '{condition.operation}' compares numbers that are known only "
-        f"when the code runs, so Python cannot decide here; write `branch` or `select` (routines.symbols)"
+        f"when the code runs, so Python cannot decide here; write `branch` or `select` (specialise.symbols)"
     )
 
 
@@ -32,22 +31,16 @@ def new_tape(longest: int = sys.maxsize) -> Tape:
     return Tape(_undecidable, longest)
 
 
-def _function(name: str, plain: Callable) -> Callable[..., Any]:
+def _function(name: str) -> Callable[..., Any]:
     def apply(*arguments: Any) -> Any:
         one = next((a for a in arguments if isinstance(a, Symbol)), None)
-        return plain(*arguments) if one is None else one.tape.write(FLOAT, name, *arguments)
+        return function_of(name, *arguments) if one is None else one.tape.write(FLOAT, name, *arguments)
 
     return apply
 
 
-sqrt, sin, cos, tan, exp, log, tanh = (
-    _function(name, getattr(math, name)) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")
-)
-arctan2, nearest, copysign = (
-    _function("arctan2", math.atan2),
-    _function("round", round),
-    _function("copysign", math.copysign),
-)
+sqrt, sin, cos, tan, exp, log, tanh = map(_function, ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh"))
+arctan2, nearest, copysign = map(_function, ("arctan2", "round", "copysign"))
 
 
 def select(condition: Any, a: Any, b: Any) -> Any:
@@ -63,23 +56,6 @@ def larger(a: Any, b: Any) -> Any:
 def smaller(a: Any, b: Any) -> Any:
     """Return the smaller of two numbers."""
     return select(b < a, b, a)
-
-
-def shared(kernel: Callable) -> Callable:
-    """Return a function that kernels use, too, for numbers that may be symbols: its conditions become branches."""
-
-    def called(*arguments: Any) -> Any:
-        symbol = next((one for one in leaves(arguments) if isinstance(one, Symbol)), None)
-        if symbol is None:
-            return kernel(*arguments)
-        trace, tape = Trace(tape=symbol.tape), symbol.tape
-        refuse, tape.decide = tape.decide, trace.decide
-        try:
-            return trace.plain(kernel)(*arguments)
-        finally:
-            tape.decide = refuse
-
-    return called
 
 
 def branch(condition: Any, first: Callable[[], Any], second: Callable[[], Any]) -> Any:
@@ -127,3 +103,15 @@ def rebuilt(tree: Any, given: Iterator[Any]) -> Any:
         return next(given)
     parts = [rebuilt(one, given) for one in tree]
     return type(tree)(*parts) if hasattr(tree, "_fields") else type(tree)(parts)
+
+
+class Indexed:
+    """A span in a routine: numbers by their index, an integer or a symbol. load: of the number at an index."""
+
+    __slots__ = ("load",)
+
+    def __init__(self, load: Callable[[Any], Any]) -> None:
+        self.load = load
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.load(index)

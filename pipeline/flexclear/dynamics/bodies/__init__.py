@@ -1,1 +1,0 @@
-"""Inertia of the bodies: rigid bodies in `rigid`, modally reduced bodies in `flexible`."""
