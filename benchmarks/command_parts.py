@@ -22,13 +22,13 @@ _RUN = "flexclear.dynamics"
 PARTS: Mapping[str, Mapping[str, str]] = {
     "flexclear.scene.load": {"load_scene": "scene"},
     "flexclear.workflow.task": {"facts": "keys", "key": "keys"},
-    "flexclear.artifacts.store": {"Store.find": "keys", "_written": "writing"},
+    "flexclear.artifacts.store": {"Store.find": "keys", "_write_content": "writing"},
     f"{_RUN}.run.evaluation.engine": {"prepare": "assembling"},
     f"{_RUN}.model.model": {"tabulate": "assembling"},
     f"{_RUN}.run.horizon.horizon": {"Pair.perturbed_run": "integrating"},
     f"{_RUN}.run.run": {"RunInParts._advanced": "integrating", "observe_run": "recording"},
     f"{_RUN}.record.dataset": {"recorded": "recording"},
-    "flexclear.post.single_run.series": {"derived": "deriving"},
+    "flexclear.post.single_run.series": {"derive_arrays": "deriving"},
 }
 _spent: dict[str, float] = {}
 _adding = Lock()

@@ -220,7 +220,7 @@ K, K15 = {"K": "1e6 N/m"}, {"K": "1e9 N/m^1.5"}
         ("+".join(f"a{k}*depth" for k in range(11)), {f"a{k}": "1 N/m" for k in range(11)}, "11 values, at most 10"),
         ("K*depth - F", {**K, "F": "1 N"}, "pulls: it is -1 N at rest at depth = 0"),
         ("K*depth - M*depth^2", {**K, "M": "2e8 N/m^2"}, "pulls"),
-        ("K*depth*(1 - 0.5*rate/impact_rate)", K, "rebounds with .* times this speed"),
+        ("K*depth*(1 - 0.5*rate/impact_rate)", K, "rebounds with .* of it"),
         ("K*depth*(1 + impact_rate/1 m/s)", K, "depends on impact_rate at rest"),
         ("K*depth + C*rate/depth", {**K, "C": "1 N s"}, "is no number at depth = 0"),
         ("K*sqrt((depth - 1 mm)*1 m)", K, "is no number at depth = 0"),
