@@ -177,7 +177,7 @@ def test_figures_of_any_run_and_a_page_with_all_inside():
     files = figures.make(runs["loose"], QUANTITIES)
     assert {"motion.png", "reactions.png", "contacts.png", "energy.png"} <= set(files)
     beside = comparison.make("compare", runs, QUANTITIES)
-    assert {"compare.png", "compare_contacts.png"} <= set(beside)
+    assert "compare.png" in beside
     part = pages.Part("a", "A", pages.media("compare.png", beside["compare.png"], "side by side"))
     text = pages.page("Title", "lead", [part, pages.Part("b", "Empty", "")]).decode()
     assert "data:image/png;base64," in text
