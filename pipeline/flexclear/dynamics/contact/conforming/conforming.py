@@ -43,3 +43,9 @@ def logarithmic(joint: Any, argument: float, constant: float) -> Conforming:
     force = argument * exp(constant) / e  # where the formula ends
     deepest = force * compliance(joint) / joint.length
     return Conforming("logarithmic", (force, deepest), deepest=LIMIT_DEPTH * deepest)
+
+
+def by_clearance(joint: Any, factor: float, constant: float) -> Conforming:
+    """Return the force of `logarithmic` for a pin in a journal, whose argument is factor E* L c, c the clearance."""
+    require_journal(joint)
+    return logarithmic(joint, factor * effective_modulus(joint) * joint.length * joint.clearance, constant)

@@ -10,16 +10,10 @@ from __future__ import annotations
 
 from math import pi
 
-from flexclear.dynamics.contact.conforming.conforming import (
-    Conforming,
-    effective_modulus,
-    logarithmic,
-    require_journal,
-)
+from flexclear.dynamics.contact.conforming.conforming import Conforming, by_clearance
 from flexclear.scene.loose_joints import ClearanceRevolute
 
 
 def resolve(joint: ClearanceRevolute) -> Conforming:
     """Return the elastic force."""
-    require_journal(joint)
-    return logarithmic(joint, 4.0 * pi * effective_modulus(joint) * joint.length * joint.clearance, -1.0)
+    return by_clearance(joint, 4.0 * pi, -1.0)

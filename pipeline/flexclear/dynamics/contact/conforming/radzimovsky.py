@@ -10,17 +10,10 @@ Bulletin 408; Young & Budynas (2002), Roark's Formulas for Stress and Strain, ta
 
 from __future__ import annotations
 
-from flexclear.dynamics.contact.conforming.conforming import (
-    Conforming,
-    effective_modulus,
-    logarithmic,
-    require_journal,
-)
+from flexclear.dynamics.contact.conforming.conforming import Conforming, by_clearance
 from flexclear.scene.loose_joints import ClearanceRevolute
 
 
 def resolve(joint: ClearanceRevolute) -> Conforming:
     """Return the elastic force."""
-    require_journal(joint)
-    argument = 16.0 * effective_modulus(joint) * joint.length * joint.clearance / (2.0 * 1.6**2)
-    return logarithmic(joint, argument, 2.0 / 3.0)
+    return by_clearance(joint, 16.0 / (2.0 * 1.6**2), 2.0 / 3.0)
