@@ -22,6 +22,8 @@ from flexclear.dynamics.vectors import ZERO, Twist, Vector, Wrench, cross, dot
 
 #: pivots of J M^-1 J^T below this fraction of their diagonal entry indicate a singular pose
 SINGULAR = 1e-13
+#: divisor of the pivot of a row that moves no free coordinate, which is zero
+TINIEST = 1e-300
 Rows = Sequence[Numbers]
 Wrenches = Sequence[Wrench]
 Blocks = dict[tuple[int, int], Rows]
@@ -159,7 +161,7 @@ def cholesky(S: Rows, diagonal: Numbers, scales: Numbers, least: Any) -> tuple[l
         L[j][j] = 1.0 / sqrt(pivot)
         for i in range(j + 1, len(S)):
             L[i][j] = (S[i][j] - _dot(L[i][:j], L[j][:j])) * L[j][j]
-        share = pivot / larger(diagonal[j], scales[j])
+        share = pivot / larger(larger(diagonal[j], scales[j]), TINIEST)
         least = select(share > 0.0, smaller(least, share), 0.0)  # also if it is not a number
     return [*diagonal, *(L[j][j] for j in range(len(L)))], L, least
 
