@@ -63,7 +63,7 @@ def test_the_bracket_under_its_weight_has_the_stress_of_scikit_fem(tmp_path: Pat
 
 def test_the_stress_of_a_swinging_bracket_does_not_know_where_it_is_turned() -> None:
     """Ground, pose and weight turned by one rotation: the same motion, and the same invariants of stress."""
-    short = {"time.end": 0.02, "solver": {"rtol": 1e-9}}
+    short = {"time.end": 0.02, "solver": {"rtol": 1e-11}}
     scene = bracket(**short)
     made = bundles(scene)
     upright = dynamics.simulate(scene, made, silent)
@@ -81,5 +81,5 @@ def test_the_stress_of_a_swinging_bracket_does_not_know_where_it_is_turned() -> 
     oblique = dynamics.simulate(bracket(**short, **turned), made, silent)
     for name in ("von_mises_stress", "first_principal_stress", "third_principal_stress"):
         one, other = (run[name].sel(gauge="bracket").values for run in (upright, oblique))
-        # the tolerance of the integration; measured 2e-7
+        # what rows between steps have of the integration; measured 4e-9
         assert np.abs(one - other).max() < 1e-5 * np.abs(one).max()

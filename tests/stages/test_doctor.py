@@ -58,8 +58,8 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> 
     def command(*words: str) -> None:
         python("-m", "flexclear.commands", *words, **own)
 
-    def code() -> dict[Path, int]:
-        return {path: path.stat().st_mtime_ns for path in kernels.rglob(f"*{files.CODE}")}
+    def code() -> dict[Path, int]:  # a file that is written again replaces the first
+        return {path: path.stat().st_ino for path in kernels.rglob(f"*{files.CODE}")}
 
     scene = new.write("pendulum", tmp_path)[0]
     command("doctor", "--compile", str(scene))
