@@ -152,11 +152,11 @@ class Room:
 # fmt: off
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
-    N_CLOSURE_PAIRS, N_GROUPS, SCHUR_SIZE, JACOBIAN_SIZE, MOST_MODES, N_LAWS, N_LOADS,
+    N_GROUPS, JACOBIAN_SIZE, N_LAWS, N_LOADS,
     N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS, N_LOAD_NUMBERS, N_CHANGES,
     F_CHANGE, W_CHANGE,
 ) = _sizes("n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger "
-    "n_closure_pairs n_groups schur_size jacobian_size most_modes n_laws n_loads n_internal "
+    "n_groups jacobian_size n_laws n_loads n_internal "
     "n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_load_numbers n_changes f_change w_change",
 )
 # fmt: on
@@ -184,10 +184,6 @@ PORTS = topology("flex shapes")  # shapes: the first one's numbers, of moving sh
 CLOSURES = topology("site_a site_b row0 n_rows support0 n_support jacobian0 kept0 n_kept coupling")
 CLOSURE_ROWS = topology("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = topology("coordinate")  # coordinates on which a closure depends
-CLOSURE_PAIRS = topology("a b")  # with common coordinates; b >= a
-#: rows of the factor of J M^-1 J^T, of which SCHUR has the reciprocals on the diagonal. first: column; origin: index of
-#: column 0, which may lie before that of the first
-CLOSURE_ENVELOPE = topology("first origin")
 #: outer, inner: sites; friction: its law or -1; bristle: index of the bristles' deflection in the state or -1
 CONTACTS = topology("outer inner normal friction surfaces bristle")  # surfaces: their kind; the gauge of a stop
 LAWS = topology("piece0 n_pieces")  # the drives' laws first
@@ -248,10 +244,11 @@ X, U, DU = _stretches("x:nq+n_drives u:nv+n_drives du:nv+n_drives")
 LINK_FRAMES, SITE_FRAMES = work(_FRAME, "n_links"), work(_FRAME, "n_sites")
 WRENCH = work("moment:3 force:3", "n_links")
 RESIDUAL, RESIDUAL_RATE = _stretches("residual:n_closure_rows residual_rate:n_closure_rows")
+#: ROOTS: per selected row the reciprocal of the diagonal entry of the factor of J M^-1 J^T
 #: ROW_SCALE: per selected row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after room for
 #: all rows, that of the last evaluation, which may be a trial far away
-JACOBIAN, SCHUR, ROW_SCALE, PIVOT = _stretches(
-    "jacobian:jacobian_size schur:schur_size row_scale:2*n_closure_rows pivot"
+JACOBIAN, ROOTS, ROW_SCALE, PIVOT = _stretches(
+    "jacobian:jacobian_size roots:n_closure_rows row_scale:2*n_closure_rows pivot"
 )
 #: per selected row its independence of those before it, at the end of the step, at its start, and the largest value so
 #: far; rows of the state's length: the Chebyshev series that passes a singular pose

@@ -185,11 +185,11 @@ def _joint_state(tables: Tables, link: Any, kind: str) -> tuple[Coordinates, lis
 
 def _closures(tables: Tables, frames: list[Frame]) -> list[Closure]:
     made, every = list[Closure](), tables.size(m.N_CLOSURE_ROWS)
-    rows, origins = tables.table(m.CLOSURE_ROWS).tolist(), tables.table(m.CLOSURE_ENVELOPE)["origin"].tolist()
+    rows = tables.table(m.CLOSURE_ROWS).tolist()
     for one in tables.table(m.CLOSURES):
         row0, count, kept0, kept = (int(one[name]) for name in ("row0", "n_rows", "kept0", "n_kept"))
         scales, diagonal = (tables.stretch(m.ROW_SCALE, first + kept0, kept) for first in (0, every))
-        roots = [cell for r in range(kept0, kept0 + kept) for cell in tables.stretch(m.SCHUR, origins[r] + r, 1)]
+        roots = tables.stretch(m.ROOTS, kept0, kept)
         residuals, opening = (tables.stretch(at, row0, count) for at in (m.RESIDUAL, m.RESIDUAL_RATE))
         results, of_joint = [*residuals, *opening], (tuple(rows[row0 : row0 + count]),)
         factor = residuals[:kept], opening[:kept], diagonal, roots, scales

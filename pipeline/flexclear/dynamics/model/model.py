@@ -144,7 +144,6 @@ def fill_model(
         m.N_LOAD_BENDS: len(loaded.bends),
         m.N_SURFACES: sum(not isinstance(contact.joint, End) for contact in mechanism.contacts),
         **{m.SIZES[f"{effect.name}_slot"]: slots[effect.name] for effect in parts.present if effect.ledger},
-        m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
     }
     arrays = pack(sizes, tables)
     of_mechanism = (mechanism.drives, mechanism.drive_signs, gravity, mechanism.length)

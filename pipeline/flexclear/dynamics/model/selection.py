@@ -10,8 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model.arrays import envelope_size
-from flexclear.dynamics.model.index_tables import closure_envelope
 from flexclear.dynamics.model.model import Model
 
 
@@ -69,11 +67,7 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
         rows[span] = declared[span][order]
         closure["kept0"], closure["n_kept"] = start, np.sum(selected[span])
         start += int(closure["n_kept"])
-    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
-    envelope["first"][:start], envelope["origin"][:start] = closure_envelope(
-        closures, model.arrays.table(m.CLOSURE_PAIRS)
-    ).T
-    h[m.N_KEPT_ROWS], h[m.SCHUR_SIZE] = start, envelope_size(envelope[:start])
+    h[m.N_KEPT_ROWS] = start
 
 
 def dense_rows(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:

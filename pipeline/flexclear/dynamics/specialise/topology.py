@@ -35,8 +35,6 @@ def topology_of(arrays: Arrays, h: np.ndarray) -> Topology:
     tables = []
     for table in m.TABLES["h"]:
         rows = arrays.table(table, h).view(np.int64).reshape(-1, table.size)
-        if table is m.CLOSURE_ENVELOPE:
-            rows = rows[: h[m.N_KEPT_ROWS]]
         tables.append(() if table in LEFT_OUT else tuple(rows.ravel().tolist()))
     return (tuple(sizes.tolist()), *tables)
 

@@ -285,9 +285,7 @@ class Engine:
 
     def independence(self) -> np.ndarray:
         """Return the independence of each selected closure row from those before it, at the state evaluated last."""
-        envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
-        diagonal = envelope["origin"] + np.arange(len(envelope))
-        return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
+        return 1.0 / np.abs(self.view(m.ROOTS)[: self.h[m.N_KEPT_ROWS]])
 
     @property
     def jacobian(self) -> np.ndarray:
