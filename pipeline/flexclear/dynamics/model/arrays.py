@@ -1,4 +1,4 @@
-"""Packing of tables and stretches into the flat arrays h, f, w and n that kernels take."""
+"""Packing of tables and stretches into the flat arrays h, f, w and n that compiled functions take."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexclear.dynamics import memory as m
 
 
 class WorkSpace(NamedTuple):
-    """Arrays that the kernels of one run may change: topology h with the offsets in w; w, n: floats and integers.
+    """Arrays that one run may change: topology h with the offsets in w; w, n: floats and integers.
 
     lengths: of the stretches of w, by their indices in the header.
     """

@@ -1,4 +1,4 @@
-"""Index tables of the closures: their supports and envelope."""
+"""Tables of the closures: their rows, and the coordinates on which they depend."""
 
 from __future__ import annotations
 

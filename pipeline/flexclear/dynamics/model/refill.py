@@ -59,7 +59,7 @@ def refill_model(model: Model, scene: Scene) -> Model | None:
     old = model.numbering
     numbering = replace(old, mechanism=mechanism, sites=list(old.sites), ports=list(old.ports))
     made = fill_model(mechanism, numbering, like=model)
-    # other kinds of laws need other kernels, other variables have other indices in the state, and a drive that begins
+    # other kinds of laws need other code, other variables have other indices in the state, and a drive that begins
     # to move may contradict another one
     alike = (made.parts, made.ny, _drives_vary(made)) == (model.parts, model.ny, _drives_vary(model))
     return made if alike else None

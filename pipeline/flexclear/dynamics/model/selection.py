@@ -1,4 +1,4 @@
-"""Selection of independent closure rows, for which the kernels solve.
+"""Selection of independent closure rows, for which an evaluation solves.
 
 Loops of a planar mechanism in space, or Bricard's linkage, impose the same condition several times. Their multipliers
 are then not unique and J M^-1 J^T is singular, although the motion is determined. A selection keeps as many rows as the
@@ -53,7 +53,7 @@ def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndar
 
 
 def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
-    """Write into h, a copy of the model's topology tables, the `selected` rows for which the kernels solve.
+    """Write into h, a copy of the model's topology tables, the `selected` rows to solve for.
 
     selected: mask over all closure rows.  Sizes and offsets do not change, except the number of rows solved for.
     """
