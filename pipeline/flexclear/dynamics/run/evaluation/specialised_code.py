@@ -1,6 +1,6 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
-It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
+It is compiled once for all scenes of a topology, and runs faster than a list of calls. Where it would be too long,
 steps run a list of calls of routines. All other evaluations are lists that store what the record has. The topology
 alone decides, so that equal scenes give equal bytes.
 """
@@ -20,7 +20,6 @@ from flexclear.dynamics.compile import functions, sources
 from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.effects import Parts
-from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
@@ -61,7 +60,7 @@ class SpecialisedCode:
 
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
     """Return the source of specialised steps, by name; none with redundant closure rows, which await a selection."""
-    if INTERPRETED or mobility.redundant:
+    if mobility.redundant:
         return {}
     return {SPECIALISED: sources.specialised(model.parts, topology_of(model.arrays, model.arrays.h))}
 
