@@ -4,7 +4,7 @@ With :math:`Z` such that :math:`JZ = 0` and :math:`Z^TMZ = 1`, small motions are
 do no work on them. The stiffness is the derivative of :math:`Z^T(\mathrm{bias} - J^T\lambda)` at fixed
 :math:`\lambda`: forces in the loops stiffen or weaken a mechanism as the tension of a string does.
 
-Changes of forces are exact: the kernels of the right-hand side run on dual numbers. Forces of one
+Changes of forces are exact: the routines of the right-hand side run on dual numbers. Forces of one
 mechanism change over lengths from a millimetre (gravity, springs) to a nanometre (a contact that is just closed). No
 step width would fit all.
 """
