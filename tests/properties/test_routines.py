@@ -18,7 +18,7 @@ from flexclear.dynamics.joints.rotation_vector import SERIES_ANGLE, series
 from flexclear.dynamics.joints.rotation_vector import closed as closed_forms
 from flexclear.dynamics.mechanics import closures, flexible, modes, shapes, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
-from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
+from flexclear.dynamics.mechanics.evaluation import evaluate as evaluated_by
 from flexclear.dynamics.mechanics.of_topology import list_of, mechanism_of
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.model import selection

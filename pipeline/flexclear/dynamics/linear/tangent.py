@@ -157,7 +157,7 @@ def changed(
     directions: changes of the state, (directions, NY).  multipliers: (rows,), zero by default.  laws: changes of the
     entries of the table LAW, (directions, entries).
     """
-    from flexclear.dynamics.mechanics.balance import balanced  # here: they import the compiler
+    from flexclear.dynamics.mechanics.balance import store_holding_forces  # here: they import the compiler
     from flexclear.dynamics.mechanics.of_topology import mechanism_of
     from flexclear.dynamics.mechanics.tables import Tables
     from flexclear.dynamics.routines.numbers import Numbers
@@ -173,5 +173,5 @@ def changed(
         w[first : first + laws.shape[1]] = dual.seeded(engine.w[first : first + laws.shape[1]], laws)
     calls = Numbers(h, model.arrays.f, np.array(w, dtype=object), engine.n, int(h[m.Y]), int(h[m.SLOPES]))
     given = np.zeros(h[m.N_KEPT_ROWS]) if multipliers is None else multipliers
-    balanced(mechanism_of(Tables(model.parts, topology)), list(given), calls)
+    store_holding_forces(mechanism_of(Tables(model.parts, topology)), list(given), calls)
     return calls.rates[: len(y)]

@@ -158,5 +158,5 @@ def _law_at_start(one: Prescribed, scene: Scene) -> float:
 
 
 def _drives_vary(model: Model) -> tuple[bool, ...]:
-    """Return the names of the drives that are not constant."""
+    """Return for each drive whether its law varies."""
     return tuple(moves(model, name) for name in model.drives)

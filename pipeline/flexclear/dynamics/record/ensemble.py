@@ -121,7 +121,7 @@ def places_of(engine: Engine, members: int, threads: int, progress: Progress) ->
     engine.specialised.exact, rows = True, engine.selected.tobytes()
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
     together = members >= FEW * threads and engine.staged
-    if together and specialised_code.made(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
+    if together and specialised_code.code_address(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
         return Places(lanes, threads)
     engine.settle(progress)
     return None

@@ -27,8 +27,8 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
     address,
     call_list,
+    code_address,
     equations,
-    made,
 )
 from flexclear.dynamics.run.evaluation.without_compiler import IN_PYTHON, Uncompiled
 from flexclear.scene.loads import SampledPid
@@ -169,7 +169,9 @@ class Engine:
         """
         specialised, rows = self.specialised, self.selected.tobytes()
         if specialised.place is not None and specialised.group is None and self.staged:
-            where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
+            where = code_address(
+                self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact
+            )
             specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
         if rows not in specialised.rows:
             specialised.rows.append(rows)

@@ -68,7 +68,7 @@ def equations(model: Model, mobility: Mobility) -> dict[str, str]:
 def address(model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent) -> int:
     """Return the address of specialised code for closure rows; 0 when there is none."""
     if rows not in code.addresses:
-        code.addresses[rows] = made(model, h, rows, progress, exact=code.exact)
+        code.addresses[rows] = code_address(model, h, rows, progress, exact=code.exact)
     return code.addresses[rows]
 
 
@@ -85,7 +85,7 @@ def call_list(
     of = rows, where
     if of not in code.running:
         if of not in code.lists:
-            given = model.parts, topology_of(model.arrays, selected(model, h, rows)), where
+            given = model.parts, topology_of(model.arrays, with_selection(model, h, rows)), where
             with _making:
                 key, place = repr(given).encode(), where if where in (m.CALLS, m.RECORD_CALLS) else None
                 code.lists[of] = stored(key, lambda: list_of(*given), partial(progress, None), place)
@@ -131,14 +131,14 @@ def evaluated_in_python(model: Model, laws: Callable, where: int = m.RECORD_CALL
     return evaluate
 
 
-def selected(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
+def with_selection(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
     """Return a copy of h with the selection of closure rows."""
     h = h.copy()
     selection.write(model, h, np.frombuffer(rows, dtype=bool))
     return h
 
 
-def made(
+def code_address(
     model: Model,
     h: np.ndarray,
     rows: bytes,
@@ -150,7 +150,7 @@ def made(
     """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
     parts, changes = model.parts, bool(h[m.N_CHANGES])
     with _making:  # engines may run concurrently
-        topology = topology_of(model.arrays, selected(model, h, rows))
+        topology = topology_of(model.arrays, with_selection(model, h, rows))
         key = (parts, topology, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
