@@ -9,6 +9,7 @@ from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.record.topology import topology
 from flexclear.dynamics.run.evaluation.observation import observe
 from flexclear.dynamics.run.evaluation.start import consistent_start
+from flexclear.dynamics.run.ledger import speeds_of_bodies
 from flexclear.dynamics.run.run import engine_of, observe_run
 from flexclear.dynamics.run.run import integrate as whole
 from flexclear.dynamics.run.trajectory import integrate
@@ -60,6 +61,8 @@ def test_bodies_and_frames_are_recorded_where_their_links_carry_them():
     motions, bodies = Motions(model, seen), model.scene.rigid()
     every, names = motions.every_body, list(model.mechanism.frames)
     turns = quaternion_to_matrix(without_sign_jumps(every.quaternion))
+    speeds = np.linalg.norm(every.velocity, axis=2)
+    assert np.abs(speeds_of_bodies(model, seen) - speeds).max() <= 1e-13 * speeds.max()
     for k, name in enumerate(motions.moving_bodies):
         link = model.mechanism.link_of[name]
         there, here = seen.links[:, link], model.links[link].placements[name]

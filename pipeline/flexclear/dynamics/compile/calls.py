@@ -48,4 +48,7 @@ def exported(name: str) -> Callable[[Callable], int]:
     return compiles(cfunc(types.int64(*arguments), **options))
 
 
-globals().update(vars(make_calls(call)))
+_calls = make_calls(call)
+evaluate, laws, rates, awaited, project = _calls.evaluate, _calls.laws, _calls.rates, _calls.awaited, _calls.project
+correct, retract, resolve = _calls.correct, _calls.retract, _calls.resolve
+factor_springs, release_spring = _calls.factor_springs, _calls.release_spring
