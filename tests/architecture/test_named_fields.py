@@ -70,7 +70,7 @@ def changed(h, f, w, n):
     frame.axes = d.site_numbers[2].axes
     touch.gap += d.link_numbers[1].inertia[4]
     d.law[1].rate = d.gravity[0].acceleration[2]
-    d.schur[1] += d.u[2]
+    d.roots[1] += d.u[2]
     d.evaluation, d.abridged = d.links[2].joint, d.state + 3
     d.mode[1] += 5
     d.rtol = d.last_pivot + d.w[d.at_y + 1] + d.at_touch

@@ -9,7 +9,7 @@ import pytest
 
 from flexclear import dynamics
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.mechanics.evaluation import placed
+from flexclear.dynamics.mechanics.evaluation import place_links
 from flexclear.dynamics.mechanics.of_topology import mechanism_of, program_of
 from flexclear.dynamics.mechanics.record import store_energies
 from flexclear.dynamics.mechanics.tables import Tables
@@ -113,7 +113,7 @@ def kinetic_energy(found: Evaluated) -> Callable[[np.ndarray], Any]:
         w[y : y + model.ny][model.speeds], w[rates] = speeds[: model.nv], speeds[model.nv :]
         mechanism = mechanism_of(tables)
         with Numbers(h, f, w, found.space.n, y, int(h[m.SLOPES])).building() as calls:
-            placed(mechanism)
+            place_links(mechanism)
             for link in mechanism.links:
                 if link.modes:
                     link.modes.need(link.motion, masses=False)  # sums over modes

@@ -41,8 +41,7 @@ def compare_with_dense_algebra(scene: Scene, rows: list[int]) -> None:
     J = selection.dense_rows(model, h, w[h[m.JACOBIAN] :][: h[m.JACOBIAN_SIZE]])
     made = Matrices(cast("Engine", found))
     S = made.dense({k: by.V for k, by in made.loops.found.items()})[:, : model.nv]
-    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[: len(J)]
-    independent = 1.0 / np.abs(w[h[m.SCHUR] + envelope["origin"] + np.arange(len(J))])
+    independent = 1.0 / np.abs(w[h[m.ROOTS] :][: len(J)])
     accelerations = modes_of(model.arrays).T @ found.rates[model.speeds]
     assert np.abs(S @ made.factor.T - J).max() < ROUNDING * np.abs(J).max()
     assert np.abs(made.jacobian[:, : model.nv] - J).max() < ROUNDING * np.abs(J).max()

@@ -15,10 +15,9 @@ from flexclear.dynamics.model.mechanism import Mechanism, build
 from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.coordinates import joint_coordinates
-from flexclear.dynamics.run.evaluation.engine import prepare
+from flexclear.dynamics.run.evaluation.engine import prepare, uncompiled
 from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.evaluation.without_compiler import uncompiled
 from flexclear.dynamics.run.run import engine_of
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import load_scene

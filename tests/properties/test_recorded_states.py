@@ -16,7 +16,7 @@ from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import Model, tabulate
-from flexclear.dynamics.run.evaluation.without_compiler import uncompiled
+from flexclear.dynamics.run.evaluation.engine import uncompiled
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE

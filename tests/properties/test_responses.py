@@ -111,10 +111,10 @@ def test_displacements_compose_rotations() -> None:
     w, v = np.cos(0.5 * angle), np.sin(0.5 * angle) / angle * omega
     expected = [w * q[0] - v @ q[1:], *(w * q[1:] + q[0] * v + np.cross(v, q[1:]))]
     # 3e-4 of the fifth power of the angle
-    assert trees.displaced("spherical", q.tolist(), omega.tolist()) == pytest.approx(expected, abs=3e-4 * angle**5)
-    moved = trees.displaced("free", [*q, 1.0, 2.0, 3.0], [*omega, 0.1, 0.2, 0.3])
+    assert trees.move_positions("spherical", q.tolist(), omega.tolist()) == pytest.approx(expected, abs=3e-4 * angle**5)
+    moved = trees.move_positions("free", [*q, 1.0, 2.0, 3.0], [*omega, 0.1, 0.2, 0.3])
     assert moved == pytest.approx([*expected, 1.1, 2.2, 3.3], abs=3e-4 * angle**5)
-    assert trees.displaced("cylindrical", [0.5, 0.2], [3.0, -1.0]) == pytest.approx([3.5, -0.8], rel=1e-15)
+    assert trees.move_positions("cylindrical", [0.5, 0.2], [3.0, -1.0]) == pytest.approx([3.5, -0.8], rel=1e-15)
 
 
 @pytest.mark.parametrize("name", ["driven", "driven loop", "held shapes in a loop", "stiffened"])

@@ -18,7 +18,7 @@ from flexclear.dynamics.joints.rotation_vector import SERIES_ANGLE, series
 from flexclear.dynamics.joints.rotation_vector import closed as closed_forms
 from flexclear.dynamics.mechanics import closures, flexible, modes, shapes, trees
 from flexclear.dynamics.mechanics.evaluation import REPORTS, status
-from flexclear.dynamics.mechanics.evaluation import evaluated as evaluated_by
+from flexclear.dynamics.mechanics.evaluation import evaluate as evaluated_by
 from flexclear.dynamics.mechanics.of_topology import list_of, mechanism_of
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.model import selection
@@ -113,9 +113,8 @@ def assert_same(found: Evaluated, w: np.ndarray, n: np.ndarray) -> None:
     for part in (slice(speeds.start), speeds, slice(speeds.stop, None)):
         assert apart(rates[part], found.rates[part].astype(float)) < ROUNDING
     rows, kept = model.arrays.size(m.N_CLOSURE_ROWS), int(h[m.N_KEPT_ROWS])
-    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[:kept]
     read = [
-        h[m.SCHUR] + envelope["origin"] + np.arange(kept),
+        h[m.ROOTS] + np.arange(kept),
         h[m.ROW_SCALE] + rows + np.arange(kept),
         h[m.PIVOT : m.PIVOT + 1],
     ]

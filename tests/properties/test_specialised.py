@@ -61,9 +61,7 @@ def read_by_steps(model: Model, h: np.ndarray) -> list[Any]:
     stretches = {table.at: table.size * rows for table, rows in sizes.items()}
     rows, kept = model.arrays.size(m.N_CLOSURE_ROWS), int(h[m.N_KEPT_ROWS])
     stretches |= {m.RESIDUAL: rows, m.RESIDUAL_RATE: rows, m.PIVOT: min(rows, 1)}
-    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)[:kept]
-    diagonal = h[m.SCHUR] + envelope["origin"] + np.arange(kept)
-    scales = h[m.ROW_SCALE] + rows + np.arange(kept)
+    diagonal, scales = h[m.ROOTS] + np.arange(kept), h[m.ROW_SCALE] + rows + np.arange(kept)
     loads = h[m.NAMED["bearing"].at] + m.NAMED["bearing"].load + m.NAMED["bearing"].size * np.arange(bearings)
     return [*(slice(h[place], h[place] + size) for place, size in stretches.items()), diagonal, scales, loads]
 

@@ -64,8 +64,9 @@ def start_refusals(
     The start that the scene asks for, its velocities, paths and surfaces; then actuators, conditions of events and
     periods of sections.  model: at the start, or where the start of another mechanism is still to be found.
     """
+    from flexclear.dynamics.run.evaluation.engine import uncompiled
     from flexclear.dynamics.run.evaluation.start import consistent_start
-    from flexclear.dynamics.run.evaluation.without_compiler import uncompiled, without_compiler
+    from flexclear.dynamics.run.evaluation.without_compiler import without_compiler
     from flexclear.dynamics.run.run import engine_of
     from flexclear.system.progress import silent
 

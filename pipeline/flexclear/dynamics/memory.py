@@ -1,17 +1,17 @@
-"""The memory that connects scenes and compiled kernels: every index, row and field is declared once, here or by its
-effect (`effects`).
+"""The memory that connects scenes, routines and compiled steps: every index, row and field is declared once, here or by
+its effect (`effects`).
 
-A kernel's code depends only on the kinds of parts present. All else is in four flat arrays that kernels take:
+The code of steps depends only on the kinds of parts present. All else is in four flat arrays:
 
 - ``h`` (integers): a header with sizes and offsets, then the topology tables;
 - ``f`` (floats): the numbers of the scene;
 - ``w`` (floats): the work space, with the integrator's state and stages;
 - ``n`` (integers): values that change during a run.
 
-Kernels read and write these arrays by the names that are declared here (`fields`).  Python reads the same rows by the
-names of their fields (`named`), and rows of the record by their contents (`integrate.recording`).  ``h[m.NV]`` is a
-size, ``h[m.FORCE]`` the index in w where an array begins, ``h[m.LINKS.at]`` that of a table in its array, and
-``m.LINKS.parent`` the offset of a field in a row of the table.
+Kernels read and write these arrays by the names that are declared here (`fields`), routines as cells of tables
+(`mechanics.tables`).  Python reads the same rows by the names of their fields (`named`), and rows of the record by
+their contents (`integrate.recording`).  ``h[m.NV]`` is a size, ``h[m.Y]`` the index in w where an array begins,
+``h[m.LINKS.at]`` that of a table in its array, and ``m.LINKS.parent`` the offset of a field in a row of the table.
 
 Arrays are flat, since calls and compilation cost in proportion to their arguments.  No two overlap, and the compiler
 knows: a value read from h stays valid after any write to w.  A kernel that writes never receives an array twice.
@@ -152,12 +152,12 @@ class Room:
 # fmt: off
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
-    N_CLOSURE_PAIRS, N_GROUPS, SCHUR_SIZE, JACOBIAN_SIZE, MOST_MODES, N_LAWS, N_LOADS,
-    N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS, N_LOAD_NUMBERS, N_CHANGES,
+    N_GROUPS, JACOBIAN_SIZE, N_LAWS, N_LOADS,
+    N_INTERNAL, N_SURFACES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS, N_LOAD_NUMBERS, N_CHANGES,
     F_CHANGE, W_CHANGE,
 ) = _sizes("n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger "
-    "n_closure_pairs n_groups schur_size jacobian_size most_modes n_laws n_loads n_internal "
-    "n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_load_numbers n_changes f_change w_change",
+    "n_groups jacobian_size n_laws n_loads n_internal "
+    "n_surfaces n_components n_guards n_load_bends n_load_numbers n_changes f_change w_change",
 )
 # fmt: on
 _sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
@@ -184,27 +184,22 @@ PORTS = topology("flex shapes")  # shapes: the first one's numbers, of moving sh
 CLOSURES = topology("site_a site_b row0 n_rows support0 n_support jacobian0 kept0 n_kept coupling")
 CLOSURE_ROWS = topology("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = topology("coordinate")  # coordinates on which a closure depends
-CLOSURE_PAIRS = topology("a b")  # with common coordinates; b >= a
-#: rows of the factor of J M^-1 J^T, of which SCHUR has the reciprocals on the diagonal. first: column; origin: index of
-#: column 0, which may lie before that of the first
-CLOSURE_ENVELOPE = topology("first origin")
 #: outer, inner: sites; friction: its law or -1; bristle: index of the bristles' deflection in the state or -1
 CONTACTS = topology("outer inner normal friction surfaces bristle")  # surfaces: their kind; the gauge of a stop
 LAWS = topology("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = topology("harmonic0 n_harmonics last")  # last: see `drives.pieces.Pieces.last`
-#: a: site, -1 where the reaction acts on the world; gauge, measured: of the joint coordinate that it acts along, and of
-#: one that it measures, or -1; internal0: first of its states; follows: 1 when it turns with its frame; look0, bend0:
-#: its first of LOOKS and LOAD_BENDS; book: index in the ledger of its work, which its loss follows
-LOADS = topology("a b law0 number0 gauge measured internal0 follows look0 bend0 book")
+#: kind: of `effects.Parts`; a: site, -1 where the reaction acts on the world; gauge, measured: of the joint coordinate
+#: that it acts along, and of one that it measures, or -1; internal0: first of its states; follows: 1 when it turns with
+#: its frame; look0, bend0: its first of LOOKS and LOAD_BENDS; book: index in the ledger of its work, which its loss
+#: follows
+LOADS = topology("kind a b law0 number0 gauge measured internal0 follows look0 bend0 book")
 LOOKS = topology("index")  # arguments of expressions: index of a site, or of a gauge
-LOAD_KINDS = topology("load0 n_loads")
 #: measurement of a joint coordinate between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
 #: turns: index of the angle with its full turns among the internal states or -1
 GAUGES = topology("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
 #: quantities on which steps end: the vector of `components` numbers from `offset` on in the table of w with this header
 #: index.  contact: one that must be closed, or -1; bearing: one whose load is the scale, or -1
 GUARDS = topology("table offset components contact bearing")
-BODIES, FRAMES = topology("link"), topology("link")  # moving bodies and named frames: no step reads them
 GROUPS = topology("group")  # error group of each state variable
 BOOKS = topology("work loss load")  # of each independent mechanism: indices in the ledger (`DRIVE_WORK`, ...)
 DRIVES = topology("book")  # index in the ledger of each drive's work
@@ -236,9 +231,6 @@ GRAVITY = numbers("acceleration:3")
 #: mechanism; share: factor of its tolerance, so that each independent mechanism is resolved at least as well as alone
 FLOORS = numbers("magnitude natural share")
 CLOSURE_NUMBERS = numbers("extent")  # of the independent mechanism [m], so that the loops of small ones close as well
-#: of bodies and named frames in their link, undeformed. mass, com, inertia: see LINK_NUMBERS; mass and inertia are 0
-#: where the link holds the body alone
-BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), numbers("origin:3")
 
 # Work space in w -----------------------------------------------------------------------------------------------------
 #: a frame in world axes; the velocity is that of its origin
@@ -248,10 +240,11 @@ X, U, DU = _stretches("x:nq+n_drives u:nv+n_drives du:nv+n_drives")
 LINK_FRAMES, SITE_FRAMES = work(_FRAME, "n_links"), work(_FRAME, "n_sites")
 WRENCH = work("moment:3 force:3", "n_links")
 RESIDUAL, RESIDUAL_RATE = _stretches("residual:n_closure_rows residual_rate:n_closure_rows")
+#: ROOTS: per selected row the reciprocal of the diagonal entry of the factor of J M^-1 J^T
 #: ROW_SCALE: per selected row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after room for
 #: all rows, that of the last evaluation, which may be a trial far away
-JACOBIAN, SCHUR, ROW_SCALE, PIVOT = _stretches(
-    "jacobian:jacobian_size schur:schur_size row_scale:2*n_closure_rows pivot"
+JACOBIAN, ROOTS, ROW_SCALE, PIVOT = _stretches(
+    "jacobian:jacobian_size roots:n_closure_rows row_scale:2*n_closure_rows pivot"
 )
 #: per selected row its independence of those before it, at the end of the step, at its start, and the largest value so
 #: far; rows of the state's length: the Chebyshev series that passes a singular pose
@@ -269,7 +262,7 @@ TOUCH = work(
 #: energy stored in bodies, springs and contacts [J]
 CLOSURE_WRENCH, ENERGY = work("moment:3 force:3", "n_closures"), work("kinetic potential elastic", "n_components")
 LAW = work("value rate second_rate", "n_laws")
-#: present result of a load: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
+#: present result of a load: force on b, its moment about the mechanism's origin, length or coordinate, its rate, stored
 #: energy, supplied power, lost power
 LOAD = work("force:3 moment:3 value rate stored power loss", "n_loads")
 #: of loads with kinks: speeds along their coordinates, arguments of max, min and abs

@@ -1,9 +1,4 @@
-"""Calls between separately compiled functions through addresses in the header of h.
-
-A right-hand side composed into its integrator is optimised again in every function between the two, and every mechanism
-needs an integrator of its own. Called by its address it is compiled once, and so is the integrator, for all mechanisms.
-A call costs some nanoseconds.
-"""
+"""C functions that Numba compiles, and their calls of others by address (`addresses`)."""
 
 from __future__ import annotations
 
@@ -11,14 +6,14 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba import carray, cfunc, types
+from numba import carray as carray
+from numba import cfunc, types
 from numba.extending import intrinsic
 
 import flexclear.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
-from flexclear.dynamics import memory as m
-from flexclear.dynamics.compile.files import PART, SIGNATURES, compiles, interpreted
-from flexclear.dynamics.fields import data
-from flexclear.dynamics.kernels import INTERPRETED, PLAIN, kernel
+from flexclear.dynamics.compile.addresses import make_calls
+from flexclear.dynamics.compile.files import SIGNATURES, compiles
+from flexclear.dynamics.kernels import PLAIN
 
 #: Numba's types of the arguments in `files.SIGNATURES`
 TYPES = {"I": types.CPointer(types.int64), "F": types.CPointer(types.float64), "i": types.int64, "f": types.float64}
@@ -45,7 +40,7 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 def exported(name: str) -> Callable[[Callable], int]:
     """Return the decorator that compiles a C function and returns its address."""
     options: dict[str, Any] = {"error_model": "numpy"}
-    if not (INTERPRETED or PLAIN):
+    if not PLAIN:
         from flexclear.dynamics.lowering import WholeCompiler
 
         options["pipeline_class"] = WholeCompiler
@@ -53,79 +48,7 @@ def exported(name: str) -> Callable[[Callable], int]:
     return compiles(cfunc(types.int64(*arguments), **options))
 
 
-if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for addresses
-
-    def call(address, arguments):
-        """Return the result of the Python function with this number."""
-        return interpreted[int(address)](*arguments)
-
-    def carray(array, shape):
-        """Return the array."""
-        return array
-
-
-@kernel
-def evaluate(h, f, w, n, t, y, dy):
-    """Evaluate the right-hand side, and store all that the record has of it: `mechanics.record`."""
-    call(h[m.EVALUATE], (h, f, w, n, float(t), y, dy))
-
-
-@kernel
-def laws(h, f, w, n, t):
-    """Evaluate the laws of time: `equations.prescribed_motion`."""
-    call(h[m.PRESCRIBE], (h, f, w, n, float(t)))
-
-
-@kernel
-def rates(d, t, y, dy):
-    """Evaluate the right-hand side for steps, which need only the rates."""
-    call(d.h[m.RATES], (d.h, d.f, d.w, d.n, float(t), y, dy))
-
-
-@kernel
-def awaited(h, f, w, n):
-    """Evaluate the rates that an attempt waits for: `integrate.method.await_rates`."""
-    d = data(h, f, w, n)
-    rates(d, d.awaited_time, d.awaited, d.rates_in)
-
-
-@kernel
-def project(h, f, w, n, t, y, dy, tolerance):
-    """Project a state onto the closures: `equations.projection`."""
-    return call(h[m.PROJECT], (h, f, w, n, float(t), y, dy, tolerance))
-
-
-@kernel
-def correct(h, f, w, n, t, y, dy):
-    """Store, as rates of the state evaluated last, the changes that close its loops: `mechanics.responses`."""
-    call(h[m.RUN], (h, f, w, n, float(t), y, dy, h[m.CLOSE]))
-
-
-@kernel
-def retract(d, y, displacement, out):
-    """Store the positions after a displacement; all are indices in w."""
-    for k in range(d.nq):
-        d.w[out + k] = d.w[y + k]
-    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, d.time, out, displacement - d.nq, d.h[m.MOVE]))
-
-
-@kernel
-def factor_springs(d, t, y):
-    """Prepare `release_spring` for a state."""
-    laws(d.h, d.f, d.w, d.n, t)
-    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, float(t), y, y, d.h[m.SPRINGS]))
-
-
-@kernel
-def release_spring(d, t, y, response):
-    """Replace forces on modes, in a row like the state's rates, by what they cause."""
-    call(d.h[m.RUN], (d.h, d.f, d.w, d.n, float(t), y, response, d.h[m.SPRINGS] + PART))
-
-
-@kernel
-def resolve(d, step, t_new, rows, events):
-    """Locate the events of a step: `integrate.stepper.make_resolution`."""
-    (count, width), (event_count, event_width) = rows.shape, events.shape
-    record = (rows, count, width, events, event_count, event_width)
-    happened = call(d.h[m.RESOLVE], (d.h, d.f, d.w, d.n, float(step), float(t_new), *record))
-    return happened, d.extended == 1, d.resolved_end, d.resolved_step
+_calls = make_calls(call)
+evaluate, laws, rates, awaited, project = _calls.evaluate, _calls.laws, _calls.rates, _calls.awaited, _calls.project
+correct, retract, resolve = _calls.correct, _calls.retract, _calls.resolve
+factor_springs, release_spring = _calls.factor_springs, _calls.release_spring

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.dynamics.compile.files import file_lock, load_file
-from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.workflow.cores import free
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def requested() -> bool:
     """Return True when a second process is useful and can be started."""
     # a program packed into one file would start itself again
     startable = bool(sys.executable) and not getattr(sys, "frozen", False)
-    return startable and not INTERPRETED and free()
+    return startable and free()
 
 
 def _start(paths: list[Path]) -> subprocess.Popen[bytes] | None:

@@ -19,15 +19,12 @@ from typing import Any
 
 from flexclear.artifacts.disk import encode_with_digest, hold_lock, publish, read_checked
 from flexclear.dynamics.compile import machine_code
-from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.specialise.tape import UnsuitedError
 
 #: receives the file that has to be compiled, or that another process compiles
 Report = Callable[[Path], None]
 #: functions loaded in this process, by the name of their file
 loaded: dict[str, machine_code.Code] = {}
-#: Python functions by their numbers, where nothing is compiled
-interpreted: dict[int, Callable] = {}
 CODE = ".code"  #: suffix of the compiled code of a file
 PART = 32  #: bytes from a part of a list to the next
 #: arguments of compiled functions, which return an integer: pointers to integers (I) and floats (F), an integer (i), a
@@ -91,7 +88,7 @@ def remove_code(path: Path) -> None:
 
 def _load_stored(path: Path) -> bool:
     """Load a file whose code is on disk; return False when the code is missing or cannot be loaded."""
-    if INTERPRETED or not compiled(path):
+    if not compiled(path):
         return False
     try:
         # another thread may have loaded the same code and be running it
@@ -127,14 +124,9 @@ def compiles(compiler: Callable[[Callable], Any]) -> Callable[[Callable], int]:
     """
 
     def compiled_function(function: Callable) -> int:
-        if INTERPRETED:
-            interpreted[id(function)] = function
-            made = machine_code.Code(id(function), function)
-        else:
-            done = compiler(function)
-            made = machine_code.Code(done.address, done)
-        loaded[function.__globals__["__name__"]] = made
-        return made.address
+        done = compiler(function)
+        loaded[function.__globals__["__name__"]] = machine_code.Code(done.address, done)
+        return int(done.address)
 
     return compiled_function
 
@@ -157,10 +149,9 @@ def _compile(path: Path) -> None:
         with _without_collector():
             # compile the source itself: Python would cache bytecode and load that without checking
             exec(compile(path.read_bytes(), str(path), "exec"), {"__name__": path.stem, "__file__": str(path)})
-        if not INTERPRETED:
-            made = loaded[path.stem]
-            publish(path.with_suffix(CODE), made.image or machine_code.image(made.keeper))
-            publish(path.with_suffix(".sum"), encode_with_digest(_digests(path)))
+        made = loaded[path.stem]
+        publish(path.with_suffix(CODE), made.image or machine_code.image(made.keeper))
+        publish(path.with_suffix(".sum"), encode_with_digest(_digests(path)))
     except BaseException:  # interrupted, or disk full: the code is incomplete
         loaded.pop(path.stem, None)
         raise

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,11 +25,10 @@ from flexclear.artifacts.paths import kernel_root
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import machine_code, sources
 from flexclear.dynamics.compile.compiler_process import second_process
-from flexclear.dynamics.compile.files import CODE, SIGNATURES, compiled, interpreted, load_files, loaded
+from flexclear.dynamics.compile.files import CODE, SIGNATURES, compiled, load_files, loaded
 from flexclear.dynamics.compile.folder import prune, writable
 from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.effects import Parts, Scheme
-from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.workflow.fingerprint import TREE, library_version, sources_of
 
 #: of each function: description for progress, and the header's index of its address if others call it (specialised code
@@ -45,24 +44,37 @@ FUNCTIONS: dict[str, tuple[str, int | None]] = {
 #: what of `dynamics` no generated file imports
 NO_KERNELS = {"analyses", "events", "linear", "mechanics", "model", "plan", "record", "routines", "run"}
 NO_KERNELS |= {"sensitivity", "starts"}
+#: h, f, w and n
+Arrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+#: without steps: no output times, no rows, no events
+NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 _TYPES = {"I": ctypes.c_void_p, "F": ctypes.c_void_p, "i": ctypes.c_int64, "f": ctypes.c_double}
 
 
 @cache
 def function(name: str, address: int) -> Callable:
     """Return the compiled function at an address for calls from Python; calls let other threads run."""
-    if INTERPRETED:
-        return interpreted[address]
     types = (_TYPES[kind] for kind in SIGNATURES[name] if kind != " ")
     made: Callable = ctypes.CFUNCTYPE(ctypes.c_int64, *types)(address)
     return made
 
 
-def place(array: np.ndarray, kind: type = np.float64) -> Any:
+def place(array: np.ndarray, kind: type = np.float64) -> int:
     """Return the address of an array's entries for C functions; raise TypeError for another type or memory layout."""
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"an array of {array.dtype}, {array.strides} bytes apart, instead of {kind.__name__} in a row")
-    return array if INTERPRETED else array.ctypes.data
+    return array.ctypes.data
+
+
+def places(arrays: Arrays) -> tuple[int, ...]:
+    """Return the addresses of h, f, w and n."""
+    h, f, w, n = arrays
+    return place(h, np.int64), place(f), place(w), place(n, np.int64)
+
+
+def record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[int, ...]:
+    """Return the arguments of `advance` for output times, rows of the record and events."""
+    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
 
 
 @dataclass(frozen=True)
@@ -71,11 +83,30 @@ class Entry:
 
     addresses: Mapping[str, int]
 
+    compiled: ClassVar[bool] = True
+
     def connect(self, h: np.ndarray) -> None:
         """Write into the header the addresses of the functions that other compiled functions call."""
         for name, (_, where) in FUNCTIONS.items():
             if where is not None:
                 h[where] = self.addresses.get(name, 0)
+
+    def observe(self, arrays: Arrays, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
+        """Evaluate the outputs of every row; arrays: h, f, w and n."""
+        given = place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape, tolerance, place(out), len(out)
+        function("observe", self.addresses["observe"])(*places(arrays), *given)
+
+    def advance(self, arrays: Arrays, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
+        """Step to the end of the segment or of the budget."""
+        function("advance", self.addresses["advance"])(*places(arrays), 0, -1, *record(outputs, rows, events))
+
+    def evaluate(self, arrays: Arrays, t: float, repeat: int) -> None:
+        """Evaluate the state in Y at time t, so many times."""
+        function("advance", self.addresses["advance"])(*places(arrays), t, repeat, *record(*NO_RECORD))
+
+    def evaluate_laws(self, arrays: Arrays, t: float) -> None:
+        """Evaluate all laws at time t."""
+        function("prescribe", self.addresses["prescribe"])(*places(arrays), t)
 
 
 def entry(

@@ -76,11 +76,9 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     by_name = {"prescribe": _laws(parts).text(PRESCRIBE)}
     if parts.closures:
         by_name["project"] = _projection(parts).text(PROJECT)
-    events = _steps(parts, scheme, f"events in steps of {scheme}", "resolution", "make_resolution")
-    if "events" in events.given:
-        events.take(f"{DYNAMICS}.fields", "data")
+    if events := _events_of_steps(parts, scheme):
         by_name["resolve"] = events.text(RESOLVE)
-    return by_name | {"observe": _observation(parts).text(OBSERVE), "advance": _advance(parts, scheme)}
+    return by_name | {"observe": _observation(parts).text(OBSERVE), "advance": _advance(parts, scheme).text(ADVANCE)}
 
 
 def _laws(parts: Parts) -> Composition:
@@ -129,14 +127,12 @@ def _of_topology(
     return f'"""Generated: right-hand side for one topology."""\n{imports}\nPARTS = {parts}\n{made}'
 
 
-def for_python(parts: Parts) -> Iterator[tuple[str, str, str]]:
-    """Yield name, kernel and source of all kernels with which Python observes a state, without compilation.
-
-    They call those before them as the names of `calls`.
-    """
-    files = {"laws": _laws(parts)} | ({"project": _projection(parts)} if parts.closures else {})
-    for name, file in (files | {"observe": _observation(parts)}).items():
-        yield name, file.kernel, file.text("")
+def for_python(parts: Parts, scheme: Scheme) -> Iterator[tuple[str, str]]:
+    """Yield the name and the source of all kernels that Python evaluates in place of functions; they use `calls`."""
+    events = _events_of_steps(parts, scheme)
+    files = [_laws(parts), _observation(parts), _advance(parts, scheme), *([events] if events else [])]
+    for file in [*files, *([_projection(parts)] if parts.closures else [])]:
+        yield file.kernel, file.text("")
 
 
 def _projection(parts: Parts) -> Composition:
@@ -153,13 +149,21 @@ def _observation(parts: Parts) -> Composition:
     return file
 
 
-def _advance(parts: Parts, scheme: Scheme) -> str:
+def _events_of_steps(parts: Parts, scheme: Scheme) -> Composition | None:
+    """Return a file for the events in steps; None without these."""
+    file = _steps(parts, scheme, f"events in steps of {scheme}", "resolution", "make_resolution")
+    file.take(f"{DYNAMICS}.fields", "data")
+    return file if "events" in file.given else None
+
+
+def _advance(parts: Parts, scheme: Scheme) -> Composition:
+    """Return a file for steps."""
     file = _steps(parts, scheme, f"steps of {scheme}", "steps", "make_advance")
     file.given["stepping"] = file.take(INTEGRATE, "fixed" if scheme.fixed else "adaptive")
     if "events" in file.given:
         file.given["resolve"] = "calls.resolve"
     file.take(DYNAMICS, "memory as m")
-    return file.text(ADVANCE)
+    return file
 
 
 def _steps(parts: Parts, scheme: Scheme, what: str, kernel: str, maker: str) -> Composition:

@@ -30,7 +30,7 @@ class Numbers(NamedTuple):
 
 @dataclass(frozen=True)
 class Resolved:
-    """A normal law, resolved: form and numbers for the kernels, and the restitution of a free impact.
+    """A normal law, resolved: form and numbers, and the restitution of a free impact.
 
     parameter: the law's own coefficient of restitution, or None.  delivered: the rebound over the
     approach speed of a free impact, None where it depends on a mass that is unknown.  warning: in words, when the law

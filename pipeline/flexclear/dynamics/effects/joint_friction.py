@@ -41,7 +41,7 @@ JOINT_FRICTION = Effect(
     # force along the axis and per moment about it; preload: constant normal force
     numbers={"bearing_numbers": "radius lever axial torsion preload law:6"},
     work={
-        # unit: wrench of its friction on the joint's second body per normal force, about the kernels' origin; loss:
+        # unit: wrench of its friction on the joint's second body per normal force, about the mechanism's origin; loss:
         # lost power per normal force [m/s]
         "bearing": ("n_bearings", "load slip loss unit_moment:3 unit_force:3"),
         # quantities with kinks of the friction where they reverse: sliding velocity, normal forces of the force along

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.equations.named_bodies import OF_BODIES, SIZE, put_bodies, put_frames
 from flexclear.dynamics.equations.projection import BLIND, keep_scales, largest, open_by
 from flexclear.dynamics.fields import data
 from flexclear.dynamics.kernels import kernel
@@ -27,17 +26,13 @@ STRIDE, EVEN = 4, 1e-6
 
 @dataclass(frozen=True)
 class Observed:
-    """Outputs at rows of the record; all over the rows, in world axes, from the kernels' origin.
+    """Outputs at rows of the record; all over the rows, in world axes, from the mechanism's origin.
 
     state: with its loops closed, (rows, NY).  positions, speeds, accelerations: of all coordinates, free ones first.
     links, sites: their frames (LINK_FRAMES), of which accelerations are true ones less gravity; (rows, links or sites).
-    body_position, ...: of the moving bodies' centres of mass and axes, (rows, bodies, 3); quaternions w x y z, w >= 0,
-    (rows, bodies, 4).  frame_position: of all named frames, (rows, frames, 3), of flexible bodies as if undeformed.
-    body_demand: wrench that rigid bodies need for their motion, less their weight, when others share their link: moment
-    about the kernels' origin, force; (rows, bodies, 6), 0 for all others.
     link_wrenches: on each link through its inboard joint; closure_wrenches: on the closures' second bodies; moment
-    about the kernels' origin (WRENCH).  touch, loads, bearings: of contacts, loads and bearings with friction (TOUCH,
-    LOAD, BEARING).
+    about the mechanism's origin (WRENCH).  touch, loads, bearings: of contacts, loads and bearings with
+    friction (TOUCH, LOAD, BEARING).
     drive_force: along the drives' coordinates in the tree [N or N m].  energy: ENERGY, (rows, independent
     mechanisms).
     jacobian: of the selected closure rows, as the kernels store it.
@@ -50,14 +45,6 @@ class Observed:
     accelerations: np.ndarray
     links: np.ndarray
     sites: np.ndarray
-    body_position: np.ndarray
-    body_quaternion: np.ndarray
-    body_velocity: np.ndarray
-    body_omega: np.ndarray
-    body_acceleration: np.ndarray
-    body_alpha: np.ndarray
-    body_demand: np.ndarray
-    frame_position: np.ndarray
     link_wrenches: np.ndarray
     closure_wrenches: np.ndarray
     touch: np.ndarray
@@ -77,8 +64,6 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
     """
     drives = size(m.N_DRIVES)
     return {
-        **{f"body_{name}": (numbers, size(m.N_BODIES)) for name, numbers in OF_BODIES.items()},
-        "frame_position": (3, size(m.N_FRAMES)),
         "residual": (None, 1),
         "status": (None, 1),
         **_links(size),
@@ -141,7 +126,7 @@ def _named_rows(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
 @kernel
 def columns_before_state(d):
     """Return the number of columns of computed outputs, and of the frames of links and sites."""
-    return SIZE * d.n_bodies + 3 * d.n_frames + 2 + m.FRAME.size * (d.n_links + d.n_sites)
+    return 2 + m.FRAME.size * (d.n_links + d.n_sites)
 
 
 @kernel
@@ -226,13 +211,9 @@ def make_observation(evaluate: Callable, project: Callable) -> Callable:
     @kernel
     def store(d, out, every, r):
         """Store the computed outputs of an evaluated row; return their number of columns."""
-        put_bodies(d, out, 0, every, r)
-        column = SIZE * d.n_bodies
-        put_frames(d, out, every * column + 3 * d.n_frames * r)
-        column += 3 * d.n_frames
-        out[every * column + r] = largest(d.residual, d.n_closure_rows)
-        out[every * (column + 1) + r] = d.evaluation
-        return column + 2
+        out[r] = largest(d.residual, d.n_closure_rows)
+        out[every + r] = d.evaluation
+        return 2
 
     @kernel
     def select(d, row, pieces):

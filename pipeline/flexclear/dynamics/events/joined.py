@@ -79,7 +79,7 @@ def stored_energies(model: Model, seen: Observed) -> dict[str, np.ndarray]:
 
 
 def _energy_of_kernels_origin(model: Model) -> float:
-    """Return the potential energy at the kernels' origin relative to the world's [J]."""
+    """Return the potential energy at the mechanism's origin relative to the world's [J]."""
     mass = sum(link.mass for link in model.links[1:])
     return -float(mass * model.gravity @ model.mechanism.origin)
 

@@ -34,7 +34,7 @@ TOO_LITTLE = 2e-4
 @kernel
 def pivot(d, r):
     """Return the independence of selected row r from the rows before it, after an evaluation: a length in M^-1."""
-    return 1.0 / abs(d.schur[d.closure_envelope[r].origin + r])
+    return 1.0 / abs(d.roots[r])
 
 
 @kernel

@@ -57,7 +57,7 @@ class Coordinate:
         return axis
 
     def wrench(self, a: np.ndarray, b: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return moment about the kernels' origin and force on G for a force `size` along the coordinate, (..., 3)."""
+        """Return moment about the mechanism's origin and force on G, for a force `size` along the coordinate."""
         push = size[..., None] * self.along(a, b)
         return (push, np.zeros_like(push)) if self.turning else (np.cross(b["origin"], push), push)
 

@@ -224,7 +224,7 @@ def modal_forces(motions: Motions, name: str, bundle: Labelled, joints: Mapping[
 
 
 def _wrenches_at_frames(motions: Motions, name: str, joints: Mapping[str, Wrench]) -> list[FrameWrench]:
-    """Return the wrenches of joints, paths and loads on a body at its frames; moments about the kernels' origin."""
+    """Return the wrenches of joints, paths and loads on a body at its frames; moments about the mechanism's origin."""
     model, acting = motions.model, list[FrameWrench]()
     for joint, (frame, sign) in _ports(model.scene, name).items():
         moment, force = joints[joint]

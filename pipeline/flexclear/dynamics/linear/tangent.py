@@ -4,7 +4,7 @@ With :math:`Z` such that :math:`JZ = 0` and :math:`Z^TMZ = 1`, small motions are
 do no work on them. The stiffness is the derivative of :math:`Z^T(\mathrm{bias} - J^T\lambda)` at fixed
 :math:`\lambda`: forces in the loops stiffen or weaken a mechanism as the tension of a string does.
 
-Changes of forces are exact: the kernels of the right-hand side run on dual numbers. Forces of one
+Changes of forces are exact: the routines of the right-hand side run on dual numbers. Forces of one
 mechanism change over lengths from a millimetre (gravity, springs) to a nanometre (a contact that is just closed). No
 step width would fit all.
 """
@@ -157,7 +157,7 @@ def changed(
     directions: changes of the state, (directions, NY).  multipliers: (rows,), zero by default.  laws: changes of the
     entries of the table LAW, (directions, entries).
     """
-    from flexclear.dynamics.mechanics.balance import balanced  # here: they import the compiler
+    from flexclear.dynamics.mechanics.balance import store_holding_forces  # here: they import the compiler
     from flexclear.dynamics.mechanics.of_topology import mechanism_of
     from flexclear.dynamics.mechanics.tables import Tables
     from flexclear.dynamics.routines.numbers import Numbers
@@ -173,5 +173,5 @@ def changed(
         w[first : first + laws.shape[1]] = dual.seeded(engine.w[first : first + laws.shape[1]], laws)
     calls = Numbers(h, model.arrays.f, np.array(w, dtype=object), engine.n, int(h[m.Y]), int(h[m.SLOPES]))
     given = np.zeros(h[m.N_KEPT_ROWS]) if multipliers is None else multipliers
-    balanced(mechanism_of(Tables(model.parts, topology)), list(given), calls)
+    store_holding_forces(mechanism_of(Tables(model.parts, topology)), list(given), calls)
     return calls.rates[: len(y)]

@@ -23,9 +23,9 @@ class Row:
     frames: the frame acted on, or the two between which the load acts; or `joint`: the frames of this joint.
     laws: law, dimension and key path of each.  numbers: as many as the load needs.  follows: True when the load turns
     with its frame.  counts_turns: True when it needs its angle beyond half a turn.  states: number of internal states.
-    bends: for each number that its kernel stores in LOAD_BENDS, the magnitudes, as speeds, at which slope or curvature
+    bends: for each number that it stores in LOAD_BENDS, the magnitudes, as speeds, at which slope or curvature
     jumps; 0.0: at a change of sign; empty: nowhere. The scene's model of the load has `bends` where steps end there.
-    reads: sort and name of each argument of an expression (`formulas.Formula`).  located: True when the kernels'
+    reads: sort and name of each argument of an expression (`formulas.Formula`).  located: True when the mechanism's
     origin, from which positions are measured, precedes its numbers.
     """
 

@@ -96,8 +96,8 @@ class _Reading:
 
 def _loads(tables: Tables, world: Frame, frames: list[Frame]) -> list[Action]:
     """Return all loads, with the places of their numbers, laws and states, and of what they store."""
-    rows, kinds, looks = (tables.table(one) for one in (m.LOADS, m.LOAD_KINDS, m.LOOKS))
-    names = [name for name, one in zip(tables.parts.loads, kinds, strict=True) for _ in range(one["n_loads"])]
+    rows, looks = tables.table(m.LOADS), tables.table(m.LOOKS)
+    names = [tables.parts.loads[kind] for kind in rows["kind"]]
     ends = {"law0": tables.size(m.N_LAWS), "number0": tables.size(m.N_LOAD_NUMBERS)}
     ends |= {"look0": len(looks), "bend0": tables.size(m.N_LOAD_BENDS)}
     spans = [list(pairwise([*rows[name].tolist(), end])) for name, end in ends.items()]

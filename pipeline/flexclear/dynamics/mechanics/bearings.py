@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 from flexclear.dynamics.contact.surfaces.separation import across
 from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
 from flexclear.dynamics.mechanics.contacts import rub
-from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, carried, on_both
+from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import larger, select, sqrt
 from flexclear.dynamics.vectors import ZERO, Matrix, Twist, Vector, Wrench, cross, dot
@@ -53,7 +53,7 @@ def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, 
 
     bearing: see `effects.joint_friction`.
     """
-    F, G = carried(*a), carried(*b)
+    F, G = site_motion(*a), site_motion(*b)
     R, r = (G if bearing.side else F).R_WB, G.p_WB - F.p_WB
     n, turning, sliding = R.column(bearing.axis), G.omega - F.omega, G.v - F.v - cross(F.omega, r)
     if bearing.kind == BALL:
@@ -71,12 +71,12 @@ def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, 
 
 
 @routine
-def recorded(slip: Vector, loss: Any, unit: Wrench, b: End) -> tuple[Any]:
+def bearing_record(slip: Vector, loss: Any, unit: Wrench, b: End) -> tuple[Any]:
     """Return what the record has of a bearing besides its load (`memory`): all but the sliding speed per normal force.
 
     slip, loss, unit: see `friction_of`.
     """
-    return ((sqrt(dot(slip, slip)), loss, unit.about(carried(*b).p_WB)),)
+    return ((sqrt(dot(slip, slip)), loss, unit.about(site_motion(*b).p_WB)),)
 
 
 @routine
@@ -94,7 +94,7 @@ def reaction_in_tree(
     for wrenches, sizes in passing:
         for wrench, size in zip(wrenches, sizes, strict=True):
             R = R - wrench * size
-    return R.about(motion.p_WB - carried(*b).p_WB) * float(second)
+    return R.about(motion.p_WB - site_motion(*b).p_WB) * float(second)
 
 
 @routine
@@ -134,7 +134,7 @@ def pressure(bearing: Any, numbers: Any, R_WB: Matrix, reaction: Wrench) -> Pres
 
 
 @routine
-def pressed(
+def normal_force(
     bearing: Any, numbers: Any, R_WB: Matrix, smooth: Wrench, parts: Sequence[Wrench], loads: Numbers, share: Any
 ) -> Any:
     """Return the normal force of a bearing, its parts with kinks, and minus its slopes by the loads of all bearings.
@@ -156,7 +156,7 @@ def excess(load: Any, size: Any) -> Any:
 
 
 @routine
-def corrected(
+def newton_step(
     corrections: Numbers,
     sign: Any,
     without: Numbers,
@@ -197,13 +197,13 @@ def corrected(
 
 
 @routine
-def lost(load: Any, loss: Any) -> Any:
+def lost_power(load: Any, loss: Any) -> Any:
     """Return the power that friction of a bearing takes [W], from that per normal force."""
     return load * loss
 
 
 @routine
-def pivoted(above: Numbers, below: Numbers, sign: Any) -> tuple[Numbers, Numbers, Any]:
+def exchange_rows(above: Numbers, below: Numbers, sign: Any) -> tuple[Numbers, Numbers, Any]:
     """Return two rows with the larger pivot in the first one, and the sign of the determinant."""
     exchange, both = abs(below[0]) > abs(above[0]), list(zip(above, below, strict=True))
     return (
@@ -214,20 +214,20 @@ def pivoted(above: Numbers, below: Numbers, sign: Any) -> tuple[Numbers, Numbers
 
 
 @routine
-def signed(pivot: Any, sign: Any) -> Any:
+def determinant_sign(pivot: Any, sign: Any) -> Any:
     """Return the sign of the determinant with a pivot, 0 where that counts as zero."""
     return select(abs(pivot) > SINGULAR, select(pivot > 0.0, sign, -sign), 0.0)
 
 
 @routine
-def eliminated(above: Numbers, below: Numbers) -> Numbers:
+def remove_unknown(above: Numbers, below: Numbers) -> Numbers:
     """Return what remains of a row without its first unknown."""
     factor = below[0] / above[0]
     return [one - factor * other for one, other in zip(below[1:], above[1:], strict=True)]
 
 
 @routine
-def substituted(row: Numbers, known: Numbers) -> Any:
+def first_unknown(row: Numbers, known: Numbers) -> Any:
     """Return the first unknown of a row from the others."""
     rest = row[-1]
     for factor, one in zip(row[1:-1], known, strict=True):
@@ -244,11 +244,11 @@ def solution(rows: Sequence[Numbers]) -> tuple[list[Any], Any]:
     while waiting:
         first = waiting.pop(0)
         for i, row in enumerate(waiting):
-            first, waiting[i], sign = pivoted(first, row, sign)
-        sign = signed(first[0], sign)
-        waiting = [eliminated(first, row) for row in waiting]
+            first, waiting[i], sign = exchange_rows(first, row, sign)
+        sign = determinant_sign(first[0], sign)
+        waiting = [remove_unknown(first, row) for row in waiting]
         above.append(first)
     x: list[Any] = []
     for row in reversed(above):
-        x.insert(0, substituted(row, x))
+        x.insert(0, first_unknown(row, x))
     return x, sign

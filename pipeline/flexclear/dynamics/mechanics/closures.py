@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from flexclear.dynamics.mechanics.trees import Gains, Motion, Numbers, Site, Step, carried
+from flexclear.dynamics.mechanics.trees import Gains, Motion, Numbers, Site, Step, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import larger, select, smaller, sqrt
 from flexclear.dynamics.vectors import ZERO, Twist, Vector, Wrench, cross, dot
@@ -37,7 +37,7 @@ def closure(rows: Sequence[tuple[int, int, int]], kept: int, a: tuple[Motion, Si
     a, b: body and site of the frames of the joint that closes the loop.  rows: see `row`.
     Source: Wang & Wang (2019), eqs. (30), (31), of prismatic joints and balls.
     """
-    A, B = carried(*a), carried(*b)
+    A, B = site_motion(*a), site_motion(*b)
     made = [row(A, B, *one) for one in rows]
     # a joint that an event has opened has no row
     columns = zip(*made, strict=True) if made else ([], [], [], [])
@@ -106,11 +106,11 @@ def along(columns: Sequence[Sequence[Twist]], wrenches: Sequence[Wrenches]) -> R
 
 
 @routine
-def transmitted(wrenches: Wrenches, multipliers: Rows, p_WB: Vector, friction: Sequence[Any]) -> tuple[Wrench]:
+def closure_wrench(wrenches: Wrenches, multipliers: Rows, p_WB: Vector, friction: Sequence[Any]) -> tuple[Wrench]:
     """Return the wrench of a closure on its second body, about the origin of the world.
 
     wrenches: of its rows there.  multipliers: without friction, by friction.  friction: loads of its bearings, and what
-    these do (`bearings.recorded`).
+    these do (`bearings.bearing_record`).
     """
     F = Wrench(ZERO, ZERO)
     for wrench, *sizes in zip(wrenches, *multipliers, strict=True):
@@ -129,7 +129,7 @@ def together(one: Sequence[Any], other: Sequence[Any]) -> list[Any]:
 
 # Matrices: rows of numbers, V as above -------------------------------------------------------------------------------
 @routine
-def coupled(S: Rows, V: Rows, W: Rows) -> Rows:
+def add_product(S: Rows, V: Rows, W: Rows) -> Rows:
     """Return S + V^T W."""
     made = zip(S, zip(*V, strict=True), strict=True)
     return [[s + _dot(v, w) for s, w in zip(row, zip(*W, strict=True), strict=True)] for row, v in made]
@@ -167,7 +167,7 @@ def cholesky(S: Rows, diagonal: Numbers, scales: Numbers, least: Any) -> tuple[l
 
 
 @routine
-def eliminated(S: Rows, A: Rows, B: Rows) -> Rows:
+def subtract_product(S: Rows, A: Rows, B: Rows) -> Rows:
     """Return S - A B^T, of a block of which S has the lower part (B = A) only that."""
     return [[s - _dot(a, b) for s, b in zip(row, B, strict=False)] for row, a in zip(S, A, strict=True)]
 
@@ -212,7 +212,7 @@ def _dot(a: Iterable[Any], b: Iterable[Any]) -> Any:
     return sum((x * y for x, y in zip(a, b, strict=True)), 0.0)
 
 
-def solved(L: Blocks, right: Sequence[Numbers]) -> list[Numbers]:
+def solve(L: Blocks, right: Sequence[Numbers]) -> list[Numbers]:
     """Return x of L L^T x = right."""
     x, before = list(right), {i: [k for k in range(i) if (i, k) in L] for i in range(len(right))}
     for i in range(len(x)):

@@ -17,7 +17,7 @@ from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.surfaces import SURFACES
 from flexclear.dynamics.contact.surfaces.separation import across
 from flexclear.dynamics.mechanics.coordinates import along
-from flexclear.dynamics.mechanics.trees import End, Numbers, carried, moving, on_both
+from flexclear.dynamics.mechanics.trees import End, Numbers, moving, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import branch, larger, sqrt
 from flexclear.dynamics.vectors import ZERO, Vector, Wrench, cross, dot
@@ -59,7 +59,7 @@ def touch(
     bristle: deflection, in axes of the outer frame, of a law that has some.  ends: of the outer and the inner surface.
     Source: Wang & Wang (2019), eqs. (23), (24).
     """
-    A, B = (carried(*end) for end in ends)
+    A, B = (site_motion(*end) for end in ends)
     p = B.p_WB - A.p_WB
     near = SURFACES[surfaces].separation(numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p))
     gap, approach, n, turning, offset = near
@@ -84,7 +84,7 @@ def touch(
 @routine
 def stop(form: str, gauge: Any, numbers: Any, closed: Any, latched: Any, turns: Numbers, *ends: End) -> Any:
     """Return the same of the end of a joint coordinate, and the rate of its turns; the force acts along it."""
-    F, G = (carried(*end) for end in ends)
+    F, G = (site_motion(*end) for end in ends)
     value, rate, unit = along(gauge, turns, F, G)
     limit, sense = numbers.shape
     gap, approach = sense * (limit - value), sense * rate

@@ -11,7 +11,7 @@ from flexclear.dynamics.mechanics import bearings as b
 from flexclear.dynamics.mechanics import closures as c
 from flexclear.dynamics.mechanics import flexible as f
 from flexclear.dynamics.mechanics import trees as t
-from flexclear.dynamics.mechanics.loops import Loops, Spread, closed, passed_inwards
+from flexclear.dynamics.mechanics.loops import Loops, Spread, close_loops, pass_inwards
 from flexclear.dynamics.mechanics.mechanism import Link, Mechanism, Rubbing
 from flexclear.dynamics.mechanics.modes import Block
 from flexclear.dynamics.mechanics.trees import Coordinates
@@ -35,27 +35,29 @@ def status(reports: t.Numbers, sound: Any, least: Any, jammed: Any) -> tuple[Any
 REPORTS = (m.OK, m.JAMMED, m.SINGULAR, m.NOT_POSITIVE)
 
 
-def evaluated(mechanism: Mechanism, calls: CallList) -> Loops:
+def evaluate(mechanism: Mechanism, calls: CallList) -> Loops:
     """Append the calls that store the rates of the state, and what steps read besides: contacts, bearings and kinks of
     loads, residuals of the loops, and the independence of their rows. Return the loops.
 
     Source: Wang & Wang (2019), eqs. (32), (34).
     """
     with calls.building():
-        placed(mechanism)
-        supplied = acted(mechanism, calls)
-        sound = eliminated(mechanism)
-        loops, jammed = closed(mechanism, calls), 0.0
+        place_links(mechanism)
+        supplied = apply_actions(mechanism, calls)
+        sound = eliminate_coordinates(mechanism)
+        loops, jammed = close_loops(mechanism, calls), 0.0
         if mechanism.rubbing:
-            lost, jammed = rubbed(mechanism, loops, calls)
+            lost, jammed = apply_friction(mechanism, loops, calls)
             supplied += lost
-        accelerated(mechanism, calls)
-        calls.write(list(mechanism.ledger.values()), booked(mechanism, [*supplied, *powers_of_links(mechanism)]))
+        accelerate_links(mechanism, calls)
+        calls.write(
+            list(mechanism.ledger.values()), rates_of_books(mechanism, [*supplied, *powers_of_links(mechanism)])
+        )
         calls.store([Cell(RESULTS, 0)], status, [calls.number(one) for one in REPORTS], sound, loops.least, jammed)
     return loops
 
 
-def placed(mechanism: Mechanism) -> None:
+def place_links(mechanism: Mechanism) -> None:
     """Compute the motion of all links, with the known part of their accelerations."""
     mechanism.ground.motion = t.ground(mechanism.gravity)
     for link in mechanism.links:
@@ -64,7 +66,7 @@ def placed(mechanism: Mechanism) -> None:
             link.motion, link.step = link.modes.place(link.motion, link.step)
 
 
-def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
+def apply_actions(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
     """Apply contacts and loads to all bodies; return powers by their books."""
     powers, rigidly = list[tuple[int, Any]](), dict[Link, Wrench]()
     for one in mechanism.actions:
@@ -75,14 +77,14 @@ def acted(mechanism: Mechanism, calls: CallList) -> list[tuple[int, Any]]:
             if frame.deformed[1]:
                 frame.push(wrench)
             elif isinstance(link, Link):
-                rigidly[link] = t.added(rigidly[link], wrench) if link in rigidly else wrench
+                rigidly[link] = t.add(rigidly[link], wrench) if link in rigidly else wrench
         powers += [(one.book + k, power) for k, power in enumerate(supplied) if not _zero(power)]
     for link, wrench in rigidly.items():
-        link.beyond.append((t.pushed(wrench), ()))
+        link.beyond.append((t.push(wrench), ()))
     return powers
 
 
-def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
+def eliminate_coordinates(mechanism: Mechanism, slowness: float = 0.0) -> Any:
     """Eliminate all unknown coordinates, from the leaves to the ground; return whether all move mass.
 
     slowness: share [s^2] of their stiffness that modes have in their mass.
@@ -106,7 +108,7 @@ def eliminated(mechanism: Mechanism, slowness: float = 0.0) -> Any:
     return sound
 
 
-def accelerated(mechanism: Mechanism, calls: CallList | None = None) -> None:
+def accelerate_links(mechanism: Mechanism, calls: CallList | None = None) -> None:
     """Compute the accelerations of all links from their forces; store the rates of the state, if there are calls."""
     for link in mechanism.links:
         if link.driven:
@@ -132,7 +134,7 @@ class Influence(NamedTuple):
     unit: Wrench
 
 
-def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tuple[int, Any]], Any]:
+def apply_friction(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tuple[int, Any]], Any]:
     """Add friction of joints to the forces of all links, and to those on drives; return lost powers by their books, and
     1 where friction jams the mechanism."""
     influences, bearings, losses = list[Influence](), list[Any](), list[Any]()
@@ -141,13 +143,13 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
         for one in joint.bearings:
             on_both, unit, loss, R_WB = calls.store(one.sliding, b.friction_of, *one.given, *ends)
             if one.record:
-                calls.store(one.record, b.recorded, one.sliding[:3], loss, unit, ends[1])
+                calls.store(one.record, b.bearing_record, one.sliding[:3], loss, unit, ends[1])
             wrenches.append(on_both)
             units.append(unit)
             losses.append(loss)
             bearings.append((one.given[0], one.given[2], R_WB))
         ends_of_rows = list(zip(joint.frames, zip(*wrenches, strict=True), strict=True))
-        spread, *_ = passed_inwards(ends_of_rows, [0.0] * len(units))
+        spread, *_ = pass_inwards(ends_of_rows, [0.0] * len(units))
         influences += [influence(loops, spread, k, unit) for k, unit in enumerate(units)]
 
     of_bearing = [joint for joint in mechanism.rubbing for _ in joint.bearings]
@@ -171,7 +173,7 @@ def rubbed(mechanism: Mechanism, loops: Loops, calls: CallList) -> tuple[list[tu
     for by, joint, load in zip(influences, of_bearing, loads, strict=True):
         for link, wrench in by.through.items():
             (link.own if link is joint.link else link.closing).append(([wrench], [load]))
-    powers = [b.lost(*one) for one in zip(loads, losses, strict=True)]
+    powers = [b.lost_power(*one) for one in zip(loads, losses, strict=True)]
     return [(joint.book, power) for joint, power in zip(of_bearing, powers, strict=True)], jammed
 
 
@@ -188,17 +190,18 @@ def loads_of(
 
     def pressed(loads: t.Numbers, share: Any) -> list[Any]:
         return [
-            b.pressed(*one, R, parts, loads, share) for one, R, parts in zip(bearings, smooth, influence, strict=True)
+            b.normal_force(*one, R, parts, loads, share)
+            for one, R, parts in zip(bearings, smooth, influence, strict=True)
         ]
 
     def pursue(state: Any) -> tuple[Any, Any]:
         """Correct the loads once by Newton's method."""
         rows, (loads, share, *_) = list[t.Numbers](), state
         for e, (load, (size, _, slopes)) in enumerate(zip(loads, pressed(loads, share), strict=True)):
-            rows.append([*slopes[:e], t.added(1.0, slopes[e]), *slopes[e + 1 :], b.excess(load, size)])
-        return b.corrected(*b.solution(rows), without, *state)
+            rows.append([*slopes[:e], t.add(1.0, slopes[e]), *slopes[e + 1 :], b.excess(load, size)])
+        return b.newton_step(*b.solution(rows), without, *state)
 
-    without = [b.pressed(*one, R, [], [], 0.0)[0] for one, R in zip(bearings, smooth, strict=True)]
+    without = [b.normal_force(*one, R, [], [], 0.0)[0] for one, R in zip(bearings, smooth, strict=True)]
     loads, *_, jammed = calls.repeat(pursue, (without, 1.0, 0.0, inf, 0.0, 0.0))
     return loads, [bend for _, bends, _ in pressed(loads, 1.0) for bend in bends], jammed
 
@@ -216,7 +219,7 @@ def influence(loops: Loops, spread: Spread, k: int, unit: Wrench) -> Influence:
         rows: c.Rows = [[0.0]] * len(loops.ends[number][0][1])
         for moved, V in one.V.items():
             if moved in forces:
-                rows = c.coupled(rows, V, [[force] for force in forces[moved]])
+                rows = c.add_product(rows, V, [[force] for force in forces[moved]])
         right.append(c.opposite([row[0] for row in rows]))
     multipliers = answered(loops, forces, right)
     return Influence(forces, {link: on_it[k] for link, on_it in spread.through.items()}, multipliers, unit)
@@ -235,7 +238,7 @@ def respond(mechanism: Mechanism, forces: Mapping[Link | Block, t.Numbers]) -> N
     """Compute the accelerations by forces, given as L^-1 of them, alone."""
     for moved in moving(mechanism):
         moved.forces = forces.get(moved, [0.0] * len(moved.forces))
-    accelerated(mechanism)
+    accelerate_links(mechanism)
 
 
 def reactions_of(
@@ -243,7 +246,7 @@ def reactions_of(
 ) -> tuple[list[Wrench], list[list[Wrench]]]:
     """Return the reactions of each bearing's joint: without friction, and per normal force of each bearing."""
     joints, without = mechanism.rubbing, {moved: moved.forces for moved in moving(mechanism)}
-    accelerated(mechanism)
+    accelerate_links(mechanism)
     smooth, parts = [reaction(loops, joint) for joint in joints], list[list[Wrench]]()
     for by, of_joint in influences:
         respond(mechanism, by.forces)
@@ -281,11 +284,11 @@ def powers_of_links(mechanism: Mechanism) -> list[tuple[int, Any]]:
     return powers
 
 
-def booked(mechanism: Mechanism, powers: Iterable[tuple[int, Any]]) -> list[Any]:
+def rates_of_books(mechanism: Mechanism, powers: Iterable[tuple[int, Any]]) -> list[Any]:
     """Return the rates of the ledger's books: sums of powers."""
     sums: dict[int, Any] = dict.fromkeys(mechanism.ledger, 0.0)
     for book, power in powers:
-        sums[book] = power if _zero(sums[book]) else t.added(sums[book], power)
+        sums[book] = power if _zero(sums[book]) else t.add(sums[book], power)
     return list(sums.values())
 
 

@@ -145,19 +145,19 @@ class Sums(NamedTuple):
 
 
 @routine
-def displaced(
+def displace_modes(
     before: Displacement, linear: Rows, bent: Vectors, bending: Vectors, q: Numbers, u: Numbers
 ) -> tuple[Displacement, list[Vector]]:
     """Add the displacement by some modes, and return its derivatives by them; bent, bending: their G q and G u."""
     both = list(zip(by_mode(linear), bent, strict=True))
     slopes, halfway = ([s + share * g for s, g in both] for share in (1.0, 0.5))
     sums = (halfway, q, before.by), (slopes, u, before.rate), (bending, u, before.bias)
-    return Displacement(*(weighted(*one) for one in sums)), slopes
+    return Displacement(*(weighted_sum(*one) for one in sums)), slopes
 
 
 def displacement(shapes: Shapes, q: Numbers, u: Numbers) -> tuple[Displacement, list[Vector]]:
     """Return a displacement at modal coordinates and rates, and its derivatives by modes."""
-    return displaced(Displacement(), shapes.linear, *(curved(shapes.second, by) for by in (q, u)), q, u)
+    return displace_modes(Displacement(), shapes.linear, *(curved(shapes.second, by) for by in (q, u)), q, u)
 
 
 @routine
@@ -171,14 +171,14 @@ def by_mode(rows: Iterable[Numbers]) -> list[Vector]:
     return [Vector(column) for column in zip(*rows, strict=True)]
 
 
-def weighted(vectors: Iterable[Any], factors: Iterable[Any], start: Any = ZERO) -> Any:
+def weighted_sum(vectors: Iterable[Any], factors: Iterable[Any], start: Any = ZERO) -> Any:
     """Return the sum of vectors, each times its factor."""
     return sum((factor * vector for vector, factor in zip(vectors, factors, strict=True)), start)
 
 
 def scalar(a: Iterable[Any], b: Iterable[Any]) -> Any:
     """Return the sum of products."""
-    return weighted(a, b, 0.0)
+    return weighted_sum(a, b, 0.0)
 
 
 # Interface basis ------------------------------------------------------------------------------------------------------
@@ -241,7 +241,7 @@ def at_port(motion: Motion, twists: Columns, port: Port, p: Numbers, rates: Numb
 
 
 @routine
-def placed(joint: Motion, step: Step, site: Site) -> tuple[Motion, Step]:
+def place_body(joint: Motion, step: Step, site: Site) -> tuple[Motion, Step]:
     """Return the motion of a body from that of its joint's frame, which is a site on it, and the step to the body."""
     body = carrying(joint, site)
     arm = body.R_WB @ site.p_BS
@@ -260,7 +260,7 @@ def body_of(joint: Motion, step: Step, port: Port, p: Numbers, rates: Numbers, s
     body; and the twist of the body per rate of each shape. still: per shape a twist that is zero."""
     (moved, moves), (turned, turns) = (displacement(shapes, p, rates) for shapes in (port.moves, port.turns))
     site, T = deformed(port, moved, turned)
-    body, step = placed(joint, step, site)
+    body, step = place_body(joint, step, site)
     return body, step, opposite(columns_at(body, still, site, T, moves, turns))
 
 
@@ -280,12 +280,12 @@ def need(
         bending[row][j] = bending[row][j] + position * u[i]
         V[row][j] = V[row][j] + rate * u[i]
     share, curves = Share(body.E, bent, bending, V), [curved(body.moves.second, by) for by in (q, u)]
-    sums, slopes = summed(nothing(body.second), share, body.moves.linear, *curves, q, u)
+    sums, slopes = add_modes(nothing(body.second), share, body.moves.linear, *curves, q, u)
     known, I, F = whole(motion, body.mass, body.first, body.untilted, sums)
     forces, spins = on_modes(known, share, slopes, body.stiffness, body.damping, q, u, more)
     forces, spins = in_shapes(basis, body.T, forces), in_shapes(basis, body.T, spins, ZERO)
     alone, P, forces = momenta(motion.R_WB, I, F, spins, body.moved, curves[0], twists, forces)
-    return Need(I, F, P, coupled(body.mass_of_shapes, alone, P, twists, twists), forces, sums)
+    return Need(I, F, P, mass_block(body.mass_of_shapes, alone, P, twists, twists), forces, sums)
 
 
 def nothing(second: Numbers) -> Sums:
@@ -294,14 +294,14 @@ def nothing(second: Numbers) -> Sums:
 
 
 @routine
-def summed(
+def add_modes(
     before: Sums, share: Share, linear: Rows, bent: Vectors, bending: Vectors, q: Numbers, u: Numbers
 ) -> tuple[Sums, list[Vector]]:
     """Add the parts of some modes to sums, and return the derivatives of the first moment by these modes.
 
-    The arguments are those of `displaced`, of the first moment.
+    The arguments are those of `displace_modes`, of the first moment.
     """
-    (moved, slopes), (P, E) = displaced(before.moved, linear, bent, bending, q, u), (momenta_of(share), share.E)
+    (moved, slopes), (P, E) = displace_modes(before.moved, linear, bent, bending, q, u), (momenta_of(share), share.E)
     Q = [before.Q[r] + scalar(E[3 * (r % 3) + r // 3], q) + scalar(P[r], q) for r in range(9)]
     both = (before.D, P), (before.drift, share.bending)
     D, drift = (Matrix([one + scalar(row, u) for one, row in zip(old, rows, strict=True)]) for old, rows in both)
@@ -363,7 +363,7 @@ def momenta(
 
 
 @routine
-def coupled(mass: Rows, alone: Wrenches, momenta: Wrenches, twists: Columns, others: Columns) -> list[list[Any]]:
+def mass_block(mass: Rows, alone: Wrenches, momenta: Wrenches, twists: Columns, others: Columns) -> list[list[Any]]:
     """Return a block of the mass matrix of shapes; of a diagonal block, as of `mass`, the rows up to the diagonal.
 
     alone, twists: of the shapes of its rows.  momenta, others: of its columns, with the body that these move.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from flexclear.dynamics.mechanics.coordinates import along, bias
-from flexclear.dynamics.mechanics.trees import End, Numbers, carried, on_both
+from flexclear.dynamics.mechanics.trees import End, Numbers, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine
 
 
@@ -16,7 +16,7 @@ def coupling(gauges: Sequence[Any], turns: Sequence[Numbers], numbers: Any, kept
 
     gauges, turns: of the second coordinate, then of the first.  ends: of their joints.
     """
-    (F2, G2, F1, G1), r = (carried(*end) for end in ends), numbers.ratio
+    (F2, G2, F1, G1), r = (site_motion(*end) for end in ends), numbers.ratio
     second, first = along(gauges[0], turns[0], F2, G2), along(gauges[1], turns[1], F1, G1)
     residual, rate = second.value - r * first.value - numbers.offset, second.rate - r * first.rate
     turning = [one.rate for one, before in zip((second, first), turns, strict=True) for _ in before]

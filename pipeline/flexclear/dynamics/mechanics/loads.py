@@ -9,7 +9,7 @@ from flexclear.dynamics.loads import LOADS
 from flexclear.dynamics.loads.expressions import evaluated
 from flexclear.dynamics.loads.given import Given, Law, line
 from flexclear.dynamics.mechanics.coordinates import along
-from flexclear.dynamics.mechanics.trees import End, Numbers, carried, on_both
+from flexclear.dynamics.mechanics.trees import End, Numbers, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import Indexed
 from flexclear.dynamics.vectors import UNIT
@@ -25,7 +25,7 @@ def given_of(
     *ends: End,
 ) -> Given:
     """Return what a load may depend on; arguments: see `act`."""
-    frames = [carried(*end) for end in ends]
+    frames = [site_motion(*end) for end in ends]
     coordinates = [along(gauge, turns, frames[i], frames[j]) for gauge, turns, i, j in gauged]
     (F, G), named = frames[:2], [(frames, coordinates)[sort][k] for sort, k in read]
     own, tables = ([one for one in numbers if isinstance(one, Indexed) == looked_up] for looked_up in (False, True))

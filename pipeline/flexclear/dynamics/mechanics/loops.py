@@ -39,10 +39,10 @@ class Loops(NamedTuple):
 
     def solved(self, right: Sequence[t.Numbers]) -> dict[int, t.Numbers]:
         """Return the multipliers for right-hand sides."""
-        return dict(zip(self.found, c.solved(self.L, right), strict=True))
+        return dict(zip(self.found, c.solve(self.L, right), strict=True))
 
 
-def linked(mechanism: Mechanism, calls: CallList) -> Loops:
+def factorise_loops(mechanism: Mechanism, calls: CallList) -> Loops:
     """Pass the rows of all closures to the ground, and factorise their matrix."""
     found, right, S, moved_by = list[Spread](), list[Any](), c.Blocks(), dict[Link | Block, list[int]]()
     numbers, ends = list[int](), dict[int, Ends]()
@@ -52,26 +52,26 @@ def linked(mechanism: Mechanism, calls: CallList) -> Loops:
         if not kept:
             continue
         i, ends[number] = len(found), list(zip(one.frames, wrenches, strict=True))
-        mine, gamma, S[i, i] = passed_inwards(ends[number], gamma)
+        mine, gamma, S[i, i] = pass_inwards(ends[number], gamma)
         for moved, V in mine.V.items():
             for k in moved_by.setdefault(moved, []):
                 before = S.get((i, k)) or [[0.0] * len(right[k])] * kept
-                S[i, k] = c.coupled(before, V, found[k].V[moved])
+                S[i, k] = c.add_product(before, V, found[k].V[moved])
             moved_by[moved].append(i)
         found.append(mine)
         right.append(gamma)
         numbers.append(number)
     if not mechanism.closures:
         return Loops({}, {}, {}, {}, {}, 1.0)
-    L, least = factorised(S, [one for one in mechanism.closures if one.scales], calls)
+    L, least = factorise(S, [one for one in mechanism.closures if one.scales], calls)
     calls.write([mechanism.least_pivot], [least])
     ways, supplied = (dict(zip(numbers, one, strict=True)) for one in (found, right))
     return Loops(ways, ends, supplied, {}, L, least)
 
 
-def closed(mechanism: Mechanism, calls: CallList) -> Loops:
+def close_loops(mechanism: Mechanism, calls: CallList) -> Loops:
     """Add the closures' forces to those of all links."""
-    loops = linked(mechanism, calls)
+    loops = factorise_loops(mechanism, calls)
     multipliers = loops.solved(list(loops.multipliers.values()))
     loops = loops._replace(multipliers=multipliers)
     for number, mine in loops.found.items():
@@ -82,7 +82,7 @@ def closed(mechanism: Mechanism, calls: CallList) -> Loops:
     return loops
 
 
-def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tuple[c.Blocks, Any]:
+def factorise(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tuple[c.Blocks, Any]:
     """Return the factor of J M^-1 J^T, lower blocks by two closures, and its smallest pivot; store its diagonals."""
     rest, L, least = dict(S), c.Blocks(), 1.0
     for j, one in enumerate(closures):
@@ -93,11 +93,11 @@ def factorised(S: c.Blocks, closures: Sequence[Closure], calls: CallList) -> tup
             L[i, j] = c.below(rest[i, j], L[j, j])
             for k in column[: at + 1]:
                 before = rest.get((i, k)) or [[0.0] * len(L[k, j])] * len(L[i, j])
-                rest[i, k] = c.eliminated(before, L[i, j], L[k, j])
+                rest[i, k] = c.subtract_product(before, L[i, j], L[k, j])
     return L, least
 
 
-def passed_inwards(
+def pass_inwards(
     ends: Ends, gamma: t.Numbers, on_shapes: Mapping[Link, c.Rows] = MappingProxyType({})
 ) -> tuple[Spread, t.Numbers, c.Rows]:
     """Return V = L^-1 J^T of rows, gamma - V^T L^-1 f, and V^T V; on_shapes: forces on the shapes of links, per row."""

@@ -66,7 +66,7 @@ class Frame:
 
     @property
     def placed(self) -> tuple[Motion, Site]:
-        """The motion of its body, and its site there: what `trees.carried` takes."""
+        """The motion of its body, and its site there: what `trees.site_motion` takes."""
         return self.carrier.motion, self.deformed[0]
 
     @property
@@ -82,7 +82,7 @@ class Frame:
 
     def push(self, wrench: Wrench) -> None:
         """Apply a wrench, about the origin of the body, to the body and its modes, before these are eliminated."""
-        self.resist(t.pushed(wrench))
+        self.resist(t.push(wrench))
 
 
 @dataclass(eq=False)
@@ -165,7 +165,7 @@ class Rubbed(NamedTuple):
     """A bearing with friction. given: what it is, its law and its numbers, and the state of its bristles.
 
     sliding, load, bends: where its sliding velocity with the bristles' rate, its load, and the parts of that with kinks
-    are stored.  record: where that is stored which only the record has (`bearings.recorded`).
+    are stored.  record: where that is stored which only the record has (`bearings.bearing_record`).
     """
 
     given: tuple[Any, ...]

@@ -122,12 +122,12 @@ class Modes:
         still, port = [AT_REST] * len(self.q), self.inboard
         if isinstance(port, t.Site):  # no shape moves it
             self.twists = still
-            return f.placed(joint, step, port)
+            return f.place_body(joint, step, port)
         if self.one:
             body, step, self.twists = f.body_of(joint, step, port, *self.moving, still)
             return body, step
         site, *moves = self._deformed(port)
-        body, step = f.placed(joint, step, site)
+        body, step = f.place_body(joint, step, site)
         self.twists = [one for at in self._columns(body, still, site, *moves) for one in f.opposite(at)]
         return body, step
 
@@ -147,7 +147,7 @@ class Modes:
             displacement, made = f.Displacement(), list[Any]()
             for at in split(len(p)):
                 given = columns(shapes.linear, at), bent[at], bending[at], p[at], rates[at]
-                displacement, more = f.displaced(displacement, *given)
+                displacement, more = f.displace_modes(displacement, *given)
                 made += more
             sums.append(displacement)
             slopes.append(made)
@@ -215,7 +215,7 @@ class Modes:
         for block, share in zip(self.blocks, shares, strict=True):
             at = block.at
             given = columns(body.moves.linear, at), *(one[at] for one in (*curved, q, u))
-            sums, made = f.summed(sums, share, *given)
+            sums, made = f.add_modes(sums, share, *given)
             slopes.append(made)
         known, I, F = f.whole(motion, body.mass, body.first, body.untilted, sums)
         forces, spins = list[Any](), list[Any]()
@@ -235,7 +235,7 @@ class Modes:
             for k, (other, (_, momenta, _)) in enumerate(zip(self.blocks[: i + 1], parts, strict=False)):
                 mass, others = columns(body.mass_of_shapes[block.at], other.at), self.twists[other.at]
                 if mass and not nothing((mass, twists, others)):
-                    m[i, k] = f.coupled(mass, alone, momenta, twists, others)
+                    m[i, k] = f.mass_block(mass, alone, momenta, twists, others)
         P, forces = ([one for part in parts for one in part[k]] for k in (1, 2))
         return f.Need(I, F, P, m, forces, sums)
 
@@ -291,7 +291,7 @@ class Modes:
         rows = rows or [[0.0] * len(before.forces)] * (block.at.stop - block.at.start)
         rows = e.with_beyond(rows, both) if both else rows
         for one in less:
-            rows = c.eliminated(rows, block.below[one], before.below[one])
+            rows = c.subtract_product(rows, block.below[one], before.below[one])
         return () if nothing(rows) else c.below(rows, before.gains.L)
 
     def spread(

@@ -11,12 +11,12 @@ from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.joints import JOINTS
 from flexclear.dynamics.mechanics.actions import actions_of, gear, rubbing_of
 from flexclear.dynamics.mechanics.closures import closure
-from flexclear.dynamics.mechanics.evaluation import evaluated
+from flexclear.dynamics.mechanics.evaluation import evaluate
 from flexclear.dynamics.mechanics.flexible import Modal, Port, Shapes
 from flexclear.dynamics.mechanics.mechanism import Carrier, Closure, Frame, Link, Mechanism
 from flexclear.dynamics.mechanics.modes import Modes, split
 from flexclear.dynamics.mechanics.record import describe
-from flexclear.dynamics.mechanics.responses import LISTS, listed
+from flexclear.dynamics.mechanics.responses import LISTS, append_list
 from flexclear.dynamics.mechanics.sections import Station
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.mechanics.trees import Body, Bounds, Coordinates, Site
@@ -31,13 +31,13 @@ def list_of(parts: Parts, topology: Topology, where: int = m.CALLS, calls: CallL
     """Return the list of calls that evaluates a mechanism, or another one by the place of its address in h.
 
     In RECORD_CALLS it stores, as well, all that the record has of the mechanism.  calls: to which the calls are
-    appended.  See `evaluation.evaluated`, `record.describe` and `responses.listed`.
+    appended.  See `evaluation.evaluate`, `record.describe` and `responses.append_list`.
     """
     tables, made = Tables(parts, topology, where == m.RECORD_CALLS), CallList() if calls is None else calls
     mechanism = mechanism_of(tables)
     if where in LISTS:
-        return listed(mechanism, made, where)
-    loops = evaluated(mechanism, made)
+        return append_list(mechanism, made, where)
+    loops = evaluate(mechanism, made)
     if tables.recorded:
         describe(tables, mechanism, loops, made)
     return made
@@ -46,7 +46,7 @@ def list_of(parts: Parts, topology: Topology, where: int = m.CALLS, calls: CallL
 def program_of(parts: Parts, topology: Topology, longest: int) -> Program:
     """Return these calls as straight code; raise UnsuitedError when it has more than `longest` operations."""
     tape = OneTape(longest)
-    evaluated(mechanism_of(Tables(parts, topology)), tape)
+    evaluate(mechanism_of(Tables(parts, topology)), tape)
     return tape.program
 
 
@@ -185,11 +185,11 @@ def _joint_state(tables: Tables, link: Any, kind: str) -> tuple[Coordinates, lis
 
 def _closures(tables: Tables, frames: list[Frame]) -> list[Closure]:
     made, every = list[Closure](), tables.size(m.N_CLOSURE_ROWS)
-    rows, origins = tables.table(m.CLOSURE_ROWS).tolist(), tables.table(m.CLOSURE_ENVELOPE)["origin"].tolist()
+    rows = tables.table(m.CLOSURE_ROWS).tolist()
     for one in tables.table(m.CLOSURES):
         row0, count, kept0, kept = (int(one[name]) for name in ("row0", "n_rows", "kept0", "n_kept"))
         scales, diagonal = (tables.stretch(m.ROW_SCALE, first + kept0, kept) for first in (0, every))
-        roots = [cell for r in range(kept0, kept0 + kept) for cell in tables.stretch(m.SCHUR, origins[r] + r, 1)]
+        roots = tables.stretch(m.ROOTS, kept0, kept)
         residuals, opening = (tables.stretch(at, row0, count) for at in (m.RESIDUAL, m.RESIDUAL_RATE))
         results, of_joint = [*residuals, *opening], (tuple(rows[row0 : row0 + count]),)
         factor = residuals[:kept], opening[:kept], diagonal, roots, scales

@@ -51,7 +51,7 @@ def _frames(tables: Tables, mechanism: Mechanism, calls: CallList) -> None:
     sites = [(one.placed, one.acceleration) for one in mechanism.frames]
     for table, ends in ((m.LINK_FRAMES, bodies), (m.SITE_FRAMES, sites)):
         for k, (end, acceleration) in enumerate(ends):
-            calls.store(tables.row(table, k), t.accelerated, *end, acceleration)
+            calls.store(tables.row(table, k), t.whole_motion, *end, acceleration)
 
 
 def _whole(carrier: Carrier) -> Twist:
@@ -65,7 +65,7 @@ def _wrenches(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallLis
     calls.write(tables.row(m.WRENCH, 0), [0.0] * m.WRENCH.size)
     for i, (link, row) in enumerate(zip(mechanism.links, tables.table(m.LINKS)[1:], strict=True), start=1):
         moves = link.rest, link.acceleration
-        calls.store(tables.row(m.WRENCH, i), t.transmitted, *moves, link.closing, link.motion.p_WB)
+        calls.store(tables.row(m.WRENCH, i), t.joint_wrench, *moves, link.closing, link.motion.p_WB)
         if link.driven:
             places = tables.stretch(m.DRIVE_FORCE, row["c0"] - tables.nv, row["n_speeds"])
             calls.store(places, t.driving_forces, link.step, *moves, [*link.closing, *link.own])
@@ -75,7 +75,7 @@ def _wrenches(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallLis
         multipliers = [part[number] for part in (loops.multipliers, loops.by_friction) if number in part]
         friction = [(bearing.load, bearing.record) for bearing in rubbing.get(number, ())]
         place = tables.row(m.CLOSURE_WRENCH, number)
-        calls.store(place, c.transmitted, wrenches, multipliers, one.frames[1].carrier.motion.p_WB, friction)
+        calls.store(place, c.closure_wrench, wrenches, multipliers, one.frames[1].carrier.motion.p_WB, friction)
 
 
 def _jacobian(tables: Tables, mechanism: Mechanism, loops: Loops, calls: CallList) -> None:
@@ -109,6 +109,6 @@ def store_energies(tables: Tables, mechanism: Mechanism, calls: CallList) -> Non
         for k, row in enumerate(tables.table(table)):
             of = max(component[sites[site]] for site in (row[first], row[second]) if site >= 0)
             for field in fields:
-                sums[of][2] = t.added(sums[of][2], getattr(tables.record(name, k), field))
+                sums[of][2] = t.add(sums[of][2], getattr(tables.record(name, k), field))
     for of, values in sums.items():
         calls.write(tables.row(m.ENERGY, of), values)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from flexclear.dynamics.mechanics.closures import Rows
-from flexclear.dynamics.mechanics.flexible import by_mode, weighted
+from flexclear.dynamics.mechanics.flexible import by_mode, weighted_sum
 from flexclear.dynamics.mechanics.trees import Numbers
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import cos, sin
@@ -23,7 +23,7 @@ class Station(NamedTuple):
 @routine
 def curvature(theta: Vector, kappa: Vector, station: Station, q: Numbers) -> tuple[Vector, Vector]:
     """Add the parts of some modes to rotation and curvature at a station."""
-    return weighted(by_mode(station.rotation), q, theta), weighted(by_mode(station.curvature), q, kappa)
+    return weighted_sum(by_mode(station.rotation), q, theta), weighted_sum(by_mode(station.curvature), q, kappa)
 
 
 def strained(theta: Vector, kappa: Vector) -> tuple[Any, Any, Vector]:

@@ -126,7 +126,7 @@ Columns = Sequence[Twist]
 Beyond = tuple[Resistance, Columns]
 
 
-def carried(body: Motion, site: Site) -> Motion:
+def site_motion(body: Motion, site: Site) -> Motion:
     """Return the motion of a site on a body."""
     R, p_BS = body.R_WB, body.R_WB @ site.p_BS
     deforming, speeding = site.velocity.seen(R), site.acceleration.seen(R)
@@ -138,7 +138,7 @@ def carried(body: Motion, site: Site) -> Motion:
 
 
 def carrying(frame: Motion, site: Site) -> Motion:
-    """Return the motion of a body from that of a site on it: the reverse of `carried`."""
+    """Return the motion of a body from that of a site on it: the reverse of `site_motion`."""
     R = frame.R_WB @ site.R_BS.T
     p_BS, deforming, speeding = R @ site.p_BS, site.velocity.seen(R), site.acceleration.seen(R)
     omega = frame.omega - deforming.angular
@@ -148,7 +148,7 @@ def carrying(frame: Motion, site: Site) -> Motion:
     return Motion(R, frame.p_WB - p_BS, omega, frame.v - swing - deforming.linear, alpha, a)
 
 
-on_body = routine(carried)
+on_body = routine(site_motion)
 
 
 def moving(frame: Motion, p: Vector) -> Vector:
@@ -174,7 +174,7 @@ def ground(gravity: Any) -> Motion:
 @routine
 def place(kind: str, parent: Motion, site: Site, coordinates: Coordinates) -> tuple[Motion, Step]:
     """Return a body's motion, from that of the body on which its joint sits at a site, and the step between them."""
-    F = carried(parent, site)
+    F = site_motion(parent, site)
     x, u, du = coordinates
     R_FG, p_FG, S, bias = JOINTS[kind].motion(x, u)
     p_FG = F.R_WB @ p_FG
@@ -189,13 +189,13 @@ def place(kind: str, parent: Motion, site: Site, coordinates: Coordinates) -> tu
 
 
 @routine
-def pushed(wrench: Wrench) -> Resistance:
+def push(wrench: Wrench) -> Resistance:
     """Return a wrench on a body as what it resists: a wrench without inertia, which the body need not be given."""
     return Resistance(WITHOUT, wrench * -1.0)
 
 
 @routine
-def pulled(wrenches: Sequence[Wrench], sizes: Numbers) -> Resistance:
+def pull(wrenches: Sequence[Wrench], sizes: Numbers) -> Resistance:
     """Return wrenches per unit, each times its size, in the same way."""
     parts = [wrench * size for wrench, size in zip(wrenches, sizes, strict=True)]
     return Resistance(WITHOUT, sum(parts, Wrench(ZERO, ZERO)) * -1.0)
@@ -253,14 +253,14 @@ free_joint = routine(without_coordinates)
 
 
 @routine
-def held(step: Step, rest: Resistance) -> tuple[list[Any], Resistance]:
+def holding_forces(step: Step, rest: Resistance) -> tuple[list[Any], Resistance]:
     """Return the forces along the coordinates of a joint that hold what it carries, and what the body that carries it
     must resist of it then: a wrench."""
     return [rest.F.on(s) for s in step.S], Resistance(WITHOUT, rest.F.about(step.p_PB))
 
 
 @routine
-def added(one: Any, other: Any) -> Any:
+def add(one: Any, other: Any) -> Any:
     """Return the sum of two wrenches or numbers."""
     return one + other
 
@@ -287,13 +287,13 @@ def accelerate(kind: str, coordinates: Coordinates, parent: Twist, step: Step, g
 
 
 @routine
-def turned(kind: str, x: Numbers, u: Numbers) -> list[Any]:
+def position_rates(kind: str, x: Numbers, u: Numbers) -> list[Any]:
     """Return the rates of a joint's positions at speeds, or their change by a small displacement."""
     return list(JOINTS[kind].position_rate(x, u))
 
 
 @routine
-def displaced(kind: str, x: Numbers, by: Numbers) -> list[Any]:
+def move_positions(kind: str, x: Numbers, by: Numbers) -> list[Any]:
     """Return the positions of a joint after a displacement: at its constant speed, in one step of order 4.
 
     This is exact for translations and single angles, and for quaternions to 3e-4 times the fifth power of the angle,
@@ -316,11 +316,11 @@ def follow(parent: Twist, step: Step) -> Twist:
 
 @routine
 def driving_power(step: Step, rest: Resistance, acceleration: Twist, closing: Sequence[Any], u: Numbers) -> Any:
-    """Return the power [W] that the drives of a joint supply at its speeds; see `needed`."""
-    return needed(rest, acceleration, closing).on(total(step.S, u))
+    """Return the power [W] that the drives of a joint supply at its speeds; see `needed_wrench`."""
+    return needed_wrench(rest, acceleration, closing).on(total(step.S, u))
 
 
-def needed(rest: Resistance, acceleration: Twist, closing: Sequence[Any]) -> Wrench:
+def needed_wrench(rest: Resistance, acceleration: Twist, closing: Sequence[Any]) -> Wrench:
     """Return the wrench that a body with all beyond it needs through its joint.
 
     acceleration: without the known part.  closing: of each closure the wrenches of its rows on the body and all beyond,
@@ -336,21 +336,21 @@ def needed(rest: Resistance, acceleration: Twist, closing: Sequence[Any]) -> Wre
 # What is recorded -----------------------------------------------------------------------------------------------------
 @routine
 def driving_forces(step: Step, rest: Resistance, acceleration: Twist, closing: Sequence[Any]) -> tuple[Any]:
-    """Return the forces of the drives of a joint along its coordinates; see `needed`."""
-    F = needed(rest, acceleration, closing)
+    """Return the forces of the drives of a joint along its coordinates; see `needed_wrench`."""
+    F = needed_wrench(rest, acceleration, closing)
     return ([F.on(s) for s in step.S],)
 
 
 @routine
-def transmitted(rest: Resistance, acceleration: Twist, closing: Sequence[Any], p_WB: Vector) -> tuple[Wrench]:
-    """Return the wrench on a body through its joint about the origin of the world; see `needed`."""
-    return (needed(rest, acceleration, closing).about(p_WB),)
+def joint_wrench(rest: Resistance, acceleration: Twist, closing: Sequence[Any], p_WB: Vector) -> tuple[Wrench]:
+    """Return the wrench on a body through its joint about the origin of the world; see `needed_wrench`."""
+    return (needed_wrench(rest, acceleration, closing).about(p_WB),)
 
 
 @routine
-def accelerated(body: Motion, site: Site, acceleration: Twist) -> tuple[Any]:
+def whole_motion(body: Motion, site: Site, acceleration: Twist) -> tuple[Any]:
     """Return the motion of a site on a body with its whole acceleration; acceleration: part that the body's lacks."""
-    F, more = carried(body, site), acceleration.at(body.R_WB @ site.p_BS)
+    F, more = site_motion(body, site), acceleration.at(body.R_WB @ site.p_BS)
     return ((F.p_WB, F.R_WB, F.omega, F.v, F.alpha + more.angular, F.a + more.linear),)
 
 

@@ -1,1 +1,1 @@
-"""Mechanism of a scene: links, joints and closures, numbered, in the arrays that kernels take."""
+"""Mechanism of a scene: links, joints and closures, numbered, in the arrays that compiled functions take."""

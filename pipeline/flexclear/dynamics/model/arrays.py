@@ -1,4 +1,4 @@
-"""Packing of tables and stretches into the flat arrays h, f, w and n that kernels take."""
+"""Packing of tables and stretches into the flat arrays h, f, w and n that compiled functions take."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexclear.dynamics import memory as m
 
 
 class WorkSpace(NamedTuple):
-    """Arrays that the kernels of one run may change: topology h with the offsets in w; w, n: floats and integers.
+    """Arrays that one run may change: topology h with the offsets in w; w, n: floats and integers.
 
     lengths: of the stretches of w, by their indices in the header.
     """
@@ -112,20 +112,12 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
     counted = {name: table for name, table in m.NAMED.items() if table in count and f"n_{name}" in m.SIZES}
     return {m.SIZES[f"n_{name}"]: count[table] for name, table in counted.items()} | {
         m.N_FLEX: count[m.FLEXES],
-        m.N_KEPT_ROWS: count[m.CLOSURE_ENVELOPE],
+        m.N_KEPT_ROWS: count[m.CLOSURE_ROWS],
         m.NY: count[m.GROUPS],
         m.N_GROUPS: count[m.FLOORS],
         m.N_COMPONENTS: count[m.BOOKS],
-        m.SCHUR_SIZE: envelope_size(named_rows(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
         m.JACOBIAN_SIZE: int(np.sum(closures["n_rows"] * closures["n_support"])),
     }
-
-
-def envelope_size(envelope: np.ndarray) -> int:
-    """Return the number of entries of a matrix with an envelope, given with named fields."""
-    if not len(envelope):
-        return 0
-    return int(np.max(envelope["origin"] + np.arange(1, len(envelope) + 1)))
 
 
 def _work_lengths(h: np.ndarray, room: m.Room) -> dict[int, int]:

@@ -1,6 +1,6 @@
 """Chains of links for joints of the tree.
 
-A joint moves by one kernel of its own. Where only some of its coordinates are prescribed, or where the tree meets a
+A joint moves by equations of its own. Where only some of its coordinates are prescribed, or where the tree meets a
 joint with several axes from its second frame, it becomes a chain of hinges and slides with massless links between them.
 Each coordinate of the chain is then free or known by itself. The pose of a frame on a path is a chain, too.
 """

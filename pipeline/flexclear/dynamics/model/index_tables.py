@@ -1,15 +1,13 @@
-"""Index tables of the closures: their supports and envelope."""
+"""Tables of the closures: their rows, and the coordinates on which they depend."""
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model import arrays
 from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.mechanism import Closure
 from flexclear.dynamics.model.numbering import Numbering
@@ -37,7 +35,6 @@ def closures(
         m.CLOSURES: closure,
         m.CLOSURE_ROWS: rows,
         m.SUPPORT: [c for slots in supports for c in slots],
-        **_couplings(arrays.named_rows(m.CLOSURES, closure), supports),
     }
     return tables, tuple(closing[k] for k in order)
 
@@ -84,27 +81,3 @@ def reverse_cuthill_mckee(joined: np.ndarray) -> list[int]:
                 seen.update(new)
                 level += sorted(new, key=lambda k: int(degree[k]))
     return order[::-1]
-
-
-def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]:
-    """Return the tables of pairs of closures with common coordinates, and of the envelope."""
-    users, pairs = defaultdict[int, list[int]](list), list[tuple[int, int]]()
-    for b, support in enumerate(supports):
-        pairs += [(a, b) for a in sorted({b, *(a for c in support for a in users[c])})]
-        for c in support:
-            users[c].append(b)
-    envelope = closure_envelope(closure, arrays.named_rows(m.CLOSURE_PAIRS, pairs))
-    return {m.CLOSURE_PAIRS: pairs, m.CLOSURE_ENVELOPE: envelope}
-
-
-def closure_envelope(closures: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Return first column and origin of each selected row of J M^-1 J^T, (rows, 2); pairs: rows of CLOSURE_PAIRS."""
-    first = closures["kept0"].copy()
-    for a, b in zip(pairs["a"], pairs["b"], strict=True):
-        first[b] = min(first[b], closures["kept0"][a])
-    rows, start = [], 0
-    for b, closure in enumerate(closures):
-        for k in range(closure["kept0"], closure["kept0"] + closure["n_kept"]):
-            rows.append((first[b], start - first[b]))
-            start += k - first[b] + 1
-    return arrays.rows(m.CLOSURE_ENVELOPE, rows)

@@ -83,15 +83,13 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
         internal = gauges.states(row.states, a, b) if row.states else -1
         first = numbering.known + len(laws)
         laws += its_laws
-        rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows), len(looks), len(bends)))
+        kind = kinds.index(kind_of[name])
+        rows.append((kind, a, b, first, len(numbers), gauge, look, internal, int(row.follows), len(looks), len(bends)))
         numbers += [*(mechanism.origin if row.located else ()), *row.numbers]
         looks += [_read_index(mechanism, numbering, gauges, *one) for one in row.reads]
         bends += row.bends
-    counts = [list(kind_of.values()).count(kind) for kind in kinds]
-    starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
     tables = {
         m.LOADS: rows,
-        m.LOAD_KINDS: [(int(s), c) for s, c in zip(starts, counts, strict=False)],
         m.LOAD_NUMBERS: numbers,
         m.LOOKS: looks,
     }

@@ -103,7 +103,7 @@ class Link:
 
     A rigid link's frame is its inboard joint frame; a flexible one's is its body frame.
     placements: frame of each of its bodies; none for a massless link within a joint (see `chain`).
-    start: pose in the world, from the kernels' origin.  inboard: site of its joint on the parent; None for the ground.
+    start: pose from the mechanism's origin, world axes.  inboard: site of its joint on the parent; None for the ground.
     inertia: of a rigid link, in its frame.  bundle: of a flexible one.
     """
 
@@ -164,7 +164,7 @@ class Link:
 class Mechanism:
     """Links in tree order, closures and contacts of a scene; lengths in the world's axes.
 
-    origin: point of the world, close to the mechanism, that is the kernels' origin.  length: size of the mechanism [m].
+    origin: point of the world, close to the mechanism, from which positions count.  length: size of the mechanism [m].
     components: its independent mechanisms.
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.

@@ -23,7 +23,6 @@ from flexclear.dynamics.model.loads import Load
 from flexclear.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
 from flexclear.dynamics.model.numbering import Numbering, number
 from flexclear.dynamics.model.stops import End
-from flexclear.scene.parts import RigidBody
 from flexclear.scene.schema import Scene
 
 if TYPE_CHECKING:
@@ -119,7 +118,6 @@ def fill_model(
         m.LOADS: _load_rows(mechanism, loaded, books),
         **of_effects.tables(filling.Filling(numbering, parts, ordered, gauges, slots)),
         **guards.fill(mechanism, of_effects.guards(mechanism, parts), loaded),
-        **_record_tables(mechanism),
         m.GAUGES: gauges.rows,
         m.GRAVITY: gravity,
         m.BOOKS: books,
@@ -144,36 +142,11 @@ def fill_model(
         m.N_LOAD_BENDS: len(loaded.bends),
         m.N_SURFACES: sum(not isinstance(contact.joint, End) for contact in mechanism.contacts),
         **{m.SIZES[f"{effect.name}_slot"]: slots[effect.name] for effect in parts.present if effect.ledger},
-        m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
     }
     arrays = pack(sizes, tables)
     of_mechanism = (mechanism.drives, mechanism.drive_signs, gravity, mechanism.length)
     made = (mechanism, numbering, parts, arrays, mechanism.scene, mechanism.links, ordered, mechanism.contacts, normals)
     return Model(*made, loaded.loads, *of_mechanism, numbering.nq, numbering.nv, ny)
-
-
-def _record_tables(mechanism: Mechanism) -> dict[Any, Any]:
-    """Return the tables of what is recorded by name: moving bodies in the order of the scene, and frames."""
-    bodies, frames, links = mechanism.moving_bodies, mechanism.frames.values(), mechanism.links
-    holding = [mechanism.link_of[frame.body] for frame in frames]
-    return {
-        m.BODIES: [mechanism.link_of[name] for name in bodies],
-        m.BODY_NUMBERS: [_body_numbers(mechanism, name) for name in bodies],
-        m.FRAMES: holding,
-        m.NAMED_FRAME_NUMBERS: [
-            links[i].placements[f.body].point(f.placement.p) for i, f in zip(holding, frames, strict=True)
-        ],
-    }
-
-
-def _body_numbers(mechanism: Mechanism, name: str) -> np.ndarray:
-    """Return a body's row of BODY_NUMBERS; mass and inertia are zero unless several rigid bodies share its link."""
-    body, places = mechanism.scene.body[name], mechanism.links[mechanism.link_of[name]].placements
-    here = places[name]
-    if not isinstance(body, RigidBody):
-        return np.concatenate([np.zeros(10), here.R.ravel()])
-    mass, J = (body.mass, here.R @ np.array(body.inertia) @ here.R.T) if len(places) > 1 else (0.0, np.zeros((3, 3)))
-    return np.concatenate([[mass], here.point(np.array(body.com)), _symmetric(J), here.R.ravel()])
 
 
 def _symmetric(J: np.ndarray) -> list[float]:

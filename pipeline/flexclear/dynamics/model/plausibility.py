@@ -191,7 +191,7 @@ def _links(mechanism: Mechanism, frames: tuple[str, str]) -> list[int]:
 
 
 def _position(mechanism: Mechanism, frame: str) -> np.ndarray:
-    """Return the start position of a frame, from the kernels' origin [m]."""
+    """Return the start position of a frame, from the mechanism's origin [m]."""
     there = mechanism.frames[frame]
     link = mechanism.links[mechanism.link_of[there.body]]
     position: np.ndarray = link.start.of(link.placements[there.body]).point(there.placement.p)

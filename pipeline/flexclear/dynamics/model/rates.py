@@ -140,7 +140,7 @@ class RowAxes(NamedTuple):
     point: np.ndarray
 
     def wrenches(self, length: float) -> np.ndarray:
-        """Return moment about the kernels' origin, in units of force times size, and force of each row; (rows, 6)."""
+        """Return moment about the mechanism's origin, in units of force times size, and force; (rows, 6)."""
         along = np.where(self.turning[:, None], 0.0, self.directions)
         moment = np.where(self.turning[:, None], self.directions, np.cross(self.point, along))
         return self.factor[:, None] * np.hstack([moment, length * along])

@@ -59,7 +59,7 @@ def refill_model(model: Model, scene: Scene) -> Model | None:
     old = model.numbering
     numbering = replace(old, mechanism=mechanism, sites=list(old.sites), ports=list(old.ports))
     made = fill_model(mechanism, numbering, like=model)
-    # other kinds of laws need other kernels, other variables have other indices in the state, and a drive that begins
+    # other kinds of laws need other code, other variables have other indices in the state, and a drive that begins
     # to move may contradict another one
     alike = (made.parts, made.ny, _drives_vary(made)) == (model.parts, model.ny, _drives_vary(model))
     return made if alike else None
@@ -158,5 +158,5 @@ def _law_at_start(one: Prescribed, scene: Scene) -> float:
 
 
 def _drives_vary(model: Model) -> tuple[bool, ...]:
-    """Return the names of the drives that are not constant."""
+    """Return for each drive whether its law varies."""
     return tuple(moves(model, name) for name in model.drives)

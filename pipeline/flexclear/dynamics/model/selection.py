@@ -1,4 +1,4 @@
-"""Selection of independent closure rows, for which the kernels solve.
+"""Selection of independent closure rows, for which an evaluation solves.
 
 Loops of a planar mechanism in space, or Bricard's linkage, impose the same condition several times. Their multipliers
 are then not unique and J M^-1 J^T is singular, although the motion is determined. A selection keeps as many rows as the
@@ -10,8 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model.arrays import envelope_size
-from flexclear.dynamics.model.index_tables import closure_envelope
 from flexclear.dynamics.model.model import Model
 
 
@@ -55,7 +53,7 @@ def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndar
 
 
 def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
-    """Write into h, a copy of the model's topology tables, the `selected` rows for which the kernels solve.
+    """Write into h, a copy of the model's topology tables, the `selected` rows to solve for.
 
     selected: mask over all closure rows.  Sizes and offsets do not change, except the number of rows solved for.
     """
@@ -69,11 +67,7 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
         rows[span] = declared[span][order]
         closure["kept0"], closure["n_kept"] = start, np.sum(selected[span])
         start += int(closure["n_kept"])
-    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
-    envelope["first"][:start], envelope["origin"][:start] = closure_envelope(
-        closures, model.arrays.table(m.CLOSURE_PAIRS)
-    ).T
-    h[m.N_KEPT_ROWS], h[m.SCHUR_SIZE] = start, envelope_size(envelope[:start])
+    h[m.N_KEPT_ROWS] = start
 
 
 def dense_rows(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:

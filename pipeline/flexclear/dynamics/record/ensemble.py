@@ -26,7 +26,7 @@ from flexclear.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.dynamics.run.evaluation.engine import Engine, another
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.horizon.horizon import offset_jacobian, perturbed_start
-from flexclear.dynamics.run.ledger import require_closed
+from flexclear.dynamics.run.ledger import require_closed, speeds_of_bodies
 from flexclear.dynamics.run.pieces import digest
 from flexclear.dynamics.run.progress_rate import DearError, affordable, scene_without_comparison
 from flexclear.dynamics.run.run import engines, follow, observe_run, require_shallow, rows_to_judge
@@ -121,7 +121,7 @@ def places_of(engine: Engine, members: int, threads: int, progress: Progress) ->
     engine.specialised.exact, rows = True, engine.selected.tobytes()
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
     together = members >= FEW * threads and engine.staged
-    if together and specialised_code.made(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
+    if together and specialised_code.code_address(engine.model, engine.h, rows, progress, lanes=lanes, exact=True):
         return Places(lanes, threads)
     engine.settle(progress)
     return None
@@ -172,7 +172,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> Member:
     require_shallow(model, trajectory, seen)
     throughout = rows_to_judge(engine, trajectory, seen)
     require_closed(model, *throughout)
-    speed = np.linalg.norm(throughout[1].body_velocity, axis=2).max(axis=0)
+    speed = speeds_of_bodies(model, throughout[1]).max(axis=0)
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
     return {
         **{name: values[rows] for name, (_, values) in series.items()},

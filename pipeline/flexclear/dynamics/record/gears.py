@@ -22,7 +22,7 @@ def gear_series(model: Model, seen: Observed) -> Series:
 
 
 def on_geared_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Return all gears' wrenches on frames: frame, moment about the kernels' origin, force; (time, 3) each."""
+    """Return all gears' wrenches on frames: frame, moment about the mechanism's origin, force; (time, 3) each."""
     acting = []
     for c, coupling in _couplings(model):
         size = _force(model, seen, c, coupling)

@@ -51,7 +51,7 @@ def turning_loads(model: Model, names: list[str], *, measured: bool = False) -> 
 
 
 def on_loaded_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Return each load on each of its frames: frame, moment about the kernels' origin, force; (time, 3) each."""
+    """Return each load on each of its frames: frame, moment about the mechanism's origin, force; (time, 3) each."""
     ends = [
         (k, frame, sign)
         for k, (_, frames) in enumerate(model.loads)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,13 +13,13 @@ from flexclear.dynamics.model.flexible_bodies import second_first_moment, second
 from flexclear.dynamics.model.interface_basis import frame_index
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
-from flexclear.numerics.rotations import cross, rotate, without_sign_jumps
+from flexclear.numerics.rotations import cross, matrix_to_quaternion, rotate, without_sign_jumps
 from flexclear.scene.parts import RigidBody
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion of a point of a body and of the body's axes, over time; world axes, kernels' origin.
+    """Motion of a point of a body and of the body's axes, over time; world axes, the mechanism's origin.
 
     p, v, a, omega, alpha: shape (time, 3); R: rotation body -> world, shape (time, 3, 3).  Fortran order, see
     `core.numerics.rotations.cross`.
@@ -49,7 +49,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Motion of the centres of mass and axes of several bodies, over time; world axes, kernels' origin.
+    """Motion of the centres of mass and axes of several bodies, over time; world axes, the mechanism's origin.
 
     Shape (time, body, 3); quaternions w x y z (time, body, 4).
     """
@@ -91,7 +91,7 @@ class Motions:
         if i not in self._links:
             known = ("origin", "axes", "velocity", "omega", "acceleration", "alpha")
             p, R, v, omega, a, alpha = (np.asfortranarray(self.seen.links[field][:, i]) for field in known)
-            # the kernels represent gravity as an upward acceleration of the ground
+            # the equations represent gravity as an upward acceleration of the ground
             self._links[i] = Motion(p, R, v, omega, a + self.model.gravity, alpha)
         return self._links[i]
 
@@ -109,23 +109,26 @@ class Motions:
     @cached_property
     def every_body(self) -> Bodies:
         """Motion of each moving body's centre of mass and axes."""
-        seen = self.seen
-        position, velocity, acceleration = seen.body_position, seen.body_velocity, seen.body_acceleration
-        bending = [k for k, name in enumerate(self.moving_bodies) if name in self.model.scene.flexible()]
-        if bending:
-            position, velocity, acceleration = (values.copy() for values in (position, velocity, acceleration))
-        for k in bending:
-            centre = self.body(self.moving_bodies[k])
-            position[:, k], velocity[:, k], acceleration[:, k] = centre.p, centre.v, centre.a
-        return Bodies(position, seen.body_quaternion, velocity, seen.body_omega, acceleration, seen.body_alpha)
+        return self._bodies(self.moving_bodies)
+
+    def _bodies(self, names: Sequence[str]) -> Bodies:
+        rows, bodies = len(self.seen.state), [self.body(name) for name in names]
+        p, v, omega, a, alpha = (np.empty((rows, len(names), 3)) for _ in range(5))
+        R = np.empty((rows, len(names), 3, 3))
+        for k, one in enumerate(bodies):
+            p[:, k], v[:, k], omega[:, k], a[:, k], alpha[:, k], R[:, k] = (
+                one.p,
+                one.v,
+                one.omega,
+                one.a,
+                one.alpha,
+                one.R,
+            )
+        return Bodies(p, matrix_to_quaternion(R), v, omega, a, alpha)
 
     def several(self, names: Sequence[str]) -> Bodies:
         """Return the motion of the centres of mass and axes of some moving bodies."""
-        every = self.every_body
-        if names == self.moving_bodies:  # avoids a copy of megabytes
-            return every
-        places = [self.moving_bodies.index(name) for name in names]
-        return Bodies(**{field.name: np.take(getattr(every, field.name), places, axis=1) for field in fields(Bodies)})
+        return self.every_body if names == self.moving_bodies else self._bodies(names)
 
     def body(self, name: str) -> Motion:
         """Return the motion of one moving body's centre of mass and axes."""
@@ -139,24 +142,17 @@ class Motions:
         arm, rate, second = self.modal(i).shift(shape, second_first_moment(self.model.mechanism, i))
         return self.link(i).moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
 
-    @cached_property
-    def _frames(self) -> dict[str, int]:
-        return {name: k for k, name in enumerate(self.model.mechanism.frames)}
-
     def positions(self, names: Sequence[str]) -> np.ndarray:
-        """Return the origins of named frames from the kernels' origin, shape (time, frame, 3)."""
-        rigid = self.model.mechanism.all_rigid
-        if rigid and names == list(self._frames):
-            return self.seen.frame_position
-        positions = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
-        for k, name in enumerate(() if rigid else names):
+        """Return the origins of named frames from the mechanism's origin, shape (time, frame, 3)."""
+        positions = np.empty((len(self.seen.state), len(names), 3))
+        for k, name in enumerate(names):
             i, placement = self._place(name)
-            link, bundle = self.link(i), self.model.links[i].bundle
+            link, bundle, arm = self.link(i), self.model.links[i].bundle, placement.p
             if bundle is not None:
                 label = name.partition(".")[2]
                 S = bundle["frame_translation_shape"].values[frame_index(bundle, label)]
-                bent = placement.p + self.modal(i).shift(S, second_motion(self.model.mechanism, i, label)[0])[0]
-                positions[:, k] = link.p + rotate(link.R, bent)
+                arm = arm + self.modal(i).shift(S, second_motion(self.model.mechanism, i, label)[0])[0]
+            positions[:, k] = link.p + rotate(link.R, arm)
         return positions
 
     @cached_property
@@ -209,7 +205,7 @@ def motion_series(bodies: Bodies, origin: np.ndarray) -> Variables:
 
 
 def shifted(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """Return points (time, point, 3), given from the kernels' origin, in the world."""
+    """Return points (time, point, 3), given from the mechanism's origin, in the world."""
     rows, count, _ = points.shape
     # added to whole rows, since three numbers at a time take five times as long
     return (points.reshape(rows, 3 * count) + np.tile(origin, count)).reshape(points.shape)

@@ -10,7 +10,7 @@ from flexclear.dynamics.model.stops import End
 
 
 def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Return all ends' wrenches on both frames: frame, moment about the kernels' origin, force; (time, 3) each."""
+    """Return all ends' wrenches on both frames: frame, moment about the mechanism's origin, force; (time, 3) each."""
     acting, numbering = [], model.numbering
     for c, (_, end, outer, inner) in enumerate(model.contacts):
         if not isinstance(end, End):

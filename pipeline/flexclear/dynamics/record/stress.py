@@ -161,7 +161,7 @@ def motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, n
 
 
 def _loads(motions: Motions, name: str) -> list[FrameWrench]:
-    """Return wrenches on a body by joints, paths and loads: frame, moment about kernels' origin, force; world axes."""
+    """Return wrenches on a body by joints, paths and loads: frame, moment about the mechanism's origin, force."""
     model, seen, acting = motions.model, motions.seen, list[FrameWrench]()
     for joint, (n, f) in joint_wrenches(motions).items():
         between = model.scene.joint[joint].between

@@ -12,10 +12,10 @@ from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record import gears, stops
 from flexclear.dynamics.record.motion import Motions
-from flexclear.numerics.rotations import cross
+from flexclear.numerics.rotations import cross, rotate
 from flexclear.scene.drives import PathDrive
 
-Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
+Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the mechanism's origin, force; (time, 3) each, world axes
 FrameWrench = tuple[str, np.ndarray, np.ndarray]  #: frame on which a wrench acts, and the wrench
 
 
@@ -67,7 +67,7 @@ def held_moments(motions: Motions) -> dict[int, np.ndarray]:
 
 
 def path_wrenches(model: Model, seen: Observed) -> list[FrameWrench]:
-    """Return for each frame that a drive moves along a path: its name, moment about the kernels' origin, force."""
+    """Return for each frame that a drive moves along a path: its name, moment about the mechanism's origin, force."""
     tree, drives = _tree(model, seen), model.scene.drive
     paths = {f"drive.{name}": drive.frame for name, drive in drives.items() if isinstance(drive, PathDrive)}
     return [(frame, *tree[edge]) for edge, frame in paths.items() if edge in tree]
@@ -122,10 +122,8 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
             bodies = [body for body in link.placements if body in far and body in model.mechanism.moving_bodies]
             beyond += [(name, bodies, sign)] if bodies else []
     acting = [(_bodies_of_joint(model, joint), wrench) for joint, wrench in known.items()]
-    places = {name: k for k, name in enumerate(motions.moving_bodies)}
     for name, bodies, sign in beyond:
-        demand = np.sum([motions.seen.body_demand[:, places[body]] for body in bodies], axis=0)
-        moment, force = demand[:, :3], demand[:, 3:]
+        moment, force = np.sum([_needed_wrench(motions, body) for body in bodies], axis=0)
         for (first, second), (n, f) in acting:
             out, into = first in bodies, second in bodies
             if out != into:
@@ -135,6 +133,15 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
                 moment, force = moment - n, force - f
         inside[name] = sign * moment, sign * force
     return inside
+
+
+def _needed_wrench(motions: Motions, name: str) -> Wrench:
+    """Return the wrench that a rigid body needs for its motion, less its weight."""
+    motion, body = motions.body(name), motions.model.scene.rigid()[name]
+    force, back = body.mass * (motion.a - motions.model.gravity), motion.R.swapaxes(1, 2)
+    omega, J = rotate(back, motion.omega), np.array(body.inertia)
+    spin = rotate(J, rotate(back, motion.alpha)) + cross(omega, rotate(J, omega))
+    return rotate(motion.R, spin) + cross(motion.p, force), force
 
 
 def _bodies_of_joint(model: Model, name: str) -> tuple[str, str]:

@@ -1,6 +1,6 @@
 """LLVM code of routines, and of the function that runs a list of their calls.
 
-The function is ``evaluate(h, f, w, n, t, y, dy)`` like that of kernels: it evaluates the laws of time at t, then calls
+The function is ``evaluate(h, f, w, n, t, y, dy)`` as steps call it: it evaluates the laws of time at t, then calls
 each code of the list whose address is at a place in h (`memory`), and reports in n the status that is the list's first
 result. The list is four words: number of calls, addresses of their codes and of their offsets, address of the results.
 For lists that do not evaluate, that address is a last argument.

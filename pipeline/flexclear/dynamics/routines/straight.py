@@ -1,6 +1,6 @@
 """Straight code: all calls of a list on one tape, of which nothing is stored but what is asked for.
 
-It serves what is short, several states at once, and tangents. The tape names numbers as those of kernels do
+It serves what is short, several states at once, and tangents. The tape names numbers by their stretch
 (`specialise.program`).
 """
 

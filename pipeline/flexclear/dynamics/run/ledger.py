@@ -9,6 +9,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.equations.observation import Observed, Variables
+from flexclear.dynamics.model.initial import centre_of
 from flexclear.dynamics.model.mechanism import Site
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.run import joint_friction
@@ -16,6 +17,7 @@ from flexclear.dynamics.run.controllers import REMEDY, require_controlled
 from flexclear.dynamics.run.progress_rate import DearError, affordable
 from flexclear.dynamics.run.refusals.refusal import STIFF_SHARE
 from flexclear.dynamics.run.trajectory import Trajectory
+from flexclear.numerics.rotations import cross, rotate
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.solver import Solver
 from flexclear.system.errors import SolverError
@@ -241,14 +243,25 @@ def warnings(model: Model, seen: Observed) -> list[str]:
     ]
 
 
+def speeds_of_bodies(model: Model, seen: Observed) -> np.ndarray:
+    """Return the speeds of all moving bodies' centres of mass, as if undeformed [m/s], (rows, bodies)."""
+    speeds = np.zeros((len(seen.state), len(model.mechanism.moving_bodies)))
+    for k, name in enumerate(model.mechanism.moving_bodies):
+        centre = centre_of(model, name)
+        link = seen.links[:, centre.link]
+        v = link["velocity"] + cross(link["omega"], rotate(link["axes"], centre.place))
+        speeds[:, k] = np.linalg.norm(v, axis=1)
+    return speeds
+
+
 def _require_bounded(model: Model, trajectory: Trajectory, seen: Observed) -> None:
     """Raise SolverError for an unbounded motion, for instance under a controller that makes it unstable."""
-    speeds = np.linalg.norm(seen.body_velocity, axis=2).max(axis=1, initial=0.0)
-    beyond = np.flatnonzero(~(speeds <= DIVERGED))
+    speeds = speeds_of_bodies(model, seen)
+    beyond = np.flatnonzero(~(speeds.max(axis=1, initial=0.0) <= DIVERGED))
     if len(beyond):
-        k = int(beyond[0])
-        name = model.mechanism.moving_bodies[int(np.argmax(np.linalg.norm(seen.body_velocity[k], axis=1)))]
-        text = f"the motion diverges: body {name} moves at {speeds[k]:.3g} m/s"
+        k, fastest = int(beyond[0]), int(np.argmax(speeds[beyond[0]]))
+        name = model.mechanism.moving_bodies[fastest]
+        text = f"the motion diverges: body {name} moves at {speeds[k, fastest]:.3g} m/s"
         raise SolverError(f"at t = {trajectory.time[k]:.6g} s: {text}; {REMEDY}")
 
 

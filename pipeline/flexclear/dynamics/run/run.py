@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from flexclear.dynamics.run.singular_poses.collocation import Collocation
 
 #: outputs by which runs are judged
-JUDGED = ["state", "positions", "links", "link_wrenches", "body_velocity", "touch", "loads", "energy", "residual"]
+JUDGED = ["state", "positions", "links", "link_wrenches", "touch", "loads", "energy", "residual"]
 
 
 @dataclass(frozen=True)

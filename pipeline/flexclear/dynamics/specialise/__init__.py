@@ -1,1 +1,1 @@
-"""Specialised right-hand side of one topology: kernels run on symbols, and the operations become specialised code."""
+"""Numbers, symbols and tapes of their operations, which become code for one topology."""

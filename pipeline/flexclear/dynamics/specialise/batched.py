@@ -1,4 +1,4 @@
-"""Right-hand side of one topology for several states together, or for one with its tangent, for use in kernels."""
+"""Right-hand side of one topology for several states together, or for one with its tangent."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Topology of a mechanism as its specialised code depends on it, without all that the code does not depend on.
 
-It has sizes and tables of h, without those that only laws of time, error norms and the record read. Offsets in w and
+It has sizes and tables of h, without those that only laws of time and error norms read. Offsets in w and
 f are excluded: code identifies work arrays by their index in the header, so that one code serves every integrator and
 any number of pieces of laws.
 """
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 #: sizes of the header, then the rows of each table of h
 Topology = tuple[tuple[int, ...], ...]
-#: tables that only laws of time, error norms and the record read
-LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
+#: tables that only laws of time and error norms read
+LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS)
 SIZES = m.ADDRESSES[0]
 #: bits of an index for the position in a work array; higher bits number the array, 0 for the array h, f, w or n itself
 STRETCH = 40
@@ -30,13 +30,11 @@ STATE, RATES, STATE_CHANGE, RATES_CHANGE = range(m.HEADER + 1, m.HEADER + 5)
 def topology_of(arrays: Arrays, h: np.ndarray) -> Topology:
     """Return the topology in h, with the closure rows that its selection keeps."""
     sizes = h[:SIZES].copy()
-    sizes[[m.N_GROUPS, m.N_BODIES, m.N_FRAMES, m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = 0
+    sizes[[m.N_GROUPS, m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = 0
     sizes[m.NY] = sizes[m.NQ] + sizes[m.NV] + sizes[m.N_LEDGER]  # without changes
     tables = []
     for table in m.TABLES["h"]:
         rows = arrays.table(table, h).view(np.int64).reshape(-1, table.size)
-        if table is m.CLOSURE_ENVELOPE:
-            rows = rows[: h[m.N_KEPT_ROWS]]
         tables.append(() if table in LEFT_OUT else tuple(rows.ravel().tolist()))
     return (tuple(sizes.tolist()), *tables)
 

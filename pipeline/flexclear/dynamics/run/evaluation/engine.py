@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from contextvars import ContextVar
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,13 +11,10 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions
-from flexclear.dynamics.compile.files import PART, interpreted
-from flexclear.dynamics.compile.functions import function, place
 from flexclear.dynamics.effects import scheme_of
 from flexclear.dynamics.equations.prescribed_motion import SHORTEST
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.integrate.method import Method
-from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.driving import coordinate_of
 from flexclear.dynamics.model.initial import given_rates
@@ -31,23 +27,18 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
     address,
     call_list,
+    code_address,
     equations,
-    evaluated_in_python,
-    lists_in_python,
-    made,
 )
+from flexclear.dynamics.run.evaluation.without_compiler import IN_PYTHON, Uncompiled
 from flexclear.scene.loads import SampledPid
 from flexclear.system.errors import InputError, SolverError, refuse
 from flexclear.system.progress import Progress, silent
 
-#: how engines are made of models, if not with compiled functions (`without_compiler`)
-MAKER: ContextVar[Callable[[Model, Mobility], Engine] | None] = ContextVar("maker", default=None)
 #: of effects: why a run stopped, in words
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: first selections of closure rows of an integration, whose steps are specialised; those of others run lists
 SELECTIONS = 4
-#: without steps: no output times, no rows, no events
-NO_RECORD = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
 
 
 @dataclass(frozen=True)
@@ -140,9 +131,9 @@ class Engine:
 
     def connect(self, progress: Progress = silent) -> None:
         """Connect functions for the selected rows: lists of calls, and for steps specialised code where it exists."""
+        if not self.entry.compiled:
+            return self.entry.connect(self.h)
         rows, known = self.selected.tobytes(), self.specialised
-        if INTERPRETED:
-            return self._connect_python()
         for where, at in self._lists.items():
             calls = call_list(self.model, self.h, known, rows, progress, where)
             self.h[at], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data
@@ -165,18 +156,10 @@ class Engine:
         used = {m.CLOSE: size(m.N_CLOSURES), m.MOVE: method.traits.retracts, m.SPRINGS: method.room.oscillations}
         return {m.RECORD_CALLS: m.EVALUATE, **{where: m.RUN for where, needed in used.items() if needed}}
 
-    def _connect_python(self) -> None:
-        """Connect functions of Python in place of compiled lists."""
-        laws, places = interpreted[int(self.h[m.PRESCRIBE])], list(self._lists)[1:]
-        made = {where: evaluated_in_python(self.model, laws, where) for where in (m.RECORD_CALLS, m.CALLS)}
-        for at, one in zip((m.EVALUATE, m.RATES, m.RUN), (*made.values(), lists_in_python(self.model)), strict=True):
-            interpreted[id(one)], self.h[at] = one, id(one)
-        self.h[places] = 2 * PART * np.array(places, dtype=np.int64)
-
     @property
     def staged(self) -> bool:
         """True when the engine can step together with others."""
-        return bool(self.method.staged and not INTERPRETED)
+        return bool(self.method.staged and self.entry.compiled)
 
     def settle(self, progress: Progress) -> None:
         """Let further steps use specialised code or routines for the selected rows, at a place together with others.
@@ -185,41 +168,42 @@ class Engine:
         as an uninterrupted one.
         """
         specialised, rows = self.specialised, self.selected.tobytes()
-        if not INTERPRETED:
-            if specialised.place is not None and specialised.group is None and self.staged:
-                where = made(self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact)
-                specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
-            if rows not in specialised.rows:
-                specialised.rows.append(rows)
+        if specialised.place is not None and specialised.group is None and self.staged:
+            where = code_address(
+                self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact
+            )
+            specialised.group = specialised.place.group(rows, where, len(self.model.arrays.f)) if where else None
+        if rows not in specialised.rows:
+            specialised.rows.append(rows)
         self.connect(progress)
 
     def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row, in this thread."""
         rows, pieces = (np.ascontiguousarray(array) for array in (rows, pieces))
-        given = place(rows), *rows.shape, place(pieces, np.int64), len(rows), self.model.arrays.size(m.N_LAWS)
-        function("observe", self.entry.addresses["observe"])(*self._arrays(), *given, tolerance, place(out), len(out))
+        self.entry.observe(self._arrays(), rows, pieces, tolerance, out)
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
-        group, record = self.specialised.group, _record(outputs, rows, events)
+        group, record = self.specialised.group, (outputs, rows, events)
         if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
-            group.advance(self.entry.addresses["advance"], [*self._arrays(), *record])
+            words = [*functions.places(self._arrays()), *functions.record(*record)]
+            group.advance(self.entry.addresses["advance"], words)
         else:
-            function("advance", self.entry.addresses["advance"])(*self._arrays(), 0, -1, *record)
+            self.entry.advance(self._arrays(), *record)
 
     def evaluate(self, t: float, repeat: int = 1) -> None:
         """Store the rate of the state in Y at time t in the first row of SLOPES; repeat: number of evaluations."""
-        function("advance", self.entry.addresses["advance"])(*self._arrays(), t, repeat, *_record(*NO_RECORD))
+        self.entry.evaluate(self._arrays(), t, repeat)
 
     def evaluate_laws(self, t: float) -> None:
         """Store the values and rates of all laws at time t."""
-        function("prescribe", self.entry.addresses["prescribe"])(*self._arrays(), t)
+        self.entry.evaluate_laws(self._arrays(), t)
 
-    def _arrays(self) -> tuple[Any, ...]:
-        """Return the addresses of h, f, w and n for compiled functions, of which those called are connected."""
+    def _arrays(self) -> functions.Arrays:
+        """Return h, f, w and n, with the functions connected that others call."""
         if not self.h[m.EVALUATE]:
             self.connect()
-        return place(self.h, np.int64), place(self.model.arrays.f), place(self.w), place(self.n, np.int64)
+        return self.h, self.model.arrays.f, self.w, self.n
 
     def view(self, index: int) -> np.ndarray:
         """Return a section of the work array, not copied."""
@@ -285,9 +269,7 @@ class Engine:
 
     def independence(self) -> np.ndarray:
         """Return the independence of each selected closure row from those before it, at the state evaluated last."""
-        envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
-        diagonal = envelope["origin"] + np.arange(len(envelope))
-        return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
+        return 1.0 / np.abs(self.view(m.ROOTS)[: self.h[m.N_KEPT_ROWS]])
 
     @property
     def jacobian(self) -> np.ndarray:
@@ -295,12 +277,8 @@ class Engine:
         return selection.dense_rows(self.model, self.h, self.view(m.JACOBIAN))
 
 
-def _record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[Any, ...]:
-    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
-
-
 def prepare(model: Model, progress: Progress) -> Engine:
-    """Return the engine of a model, its kernels compiled or loaded unless `MAKER` makes another.
+    """Return the engine of a model, its kernels compiled or loaded unless Python evaluates them (`IN_PYTHON`).
 
     Raises SolverError for an impossible start.
     """
@@ -308,8 +286,8 @@ def prepare(model: Model, progress: Progress) -> Engine:
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
     refuse_singular(model, mobility)
-    if make := MAKER.get():
-        return make(model, mobility)
+    if IN_PYTHON.get():
+        return uncompiled(model, mobility)
     alone = equations(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
     engine = assemble(model, entry, METHODS[solver.integrator], mobility)
@@ -318,21 +296,24 @@ def prepare(model: Model, progress: Progress) -> Engine:
     return engine
 
 
-def assemble(
-    model: Model, entry: functions.Entry, method: Method, mobility: Mobility, kind: type[Engine] = Engine
-) -> Engine:
-    """Return an engine of a kind with a new work array for a model whose functions are compiled."""
+def uncompiled(model: Model, mobility: Mobility) -> Engine:
+    """Return the engine of a model that Python evaluates."""
+    return assemble(model, Uncompiled.of(model), METHODS[model.scene.solver.integrator], mobility)
+
+
+def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mobility) -> Engine:
+    """Return an engine with a new work array for a model whose functions are compiled."""
     space = model.arrays.work_space(method.room)
     entry.connect(space.h)
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    engine = kind(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
+    engine = Engine(model, entry, method, *space, selected, mobility, time.start, time.end, SpecialisedCode())
     engine.reset()
     return engine
 
 
 def another(engine: Engine) -> Engine:
     """Return a new engine of the same model, in the state before any run."""
-    made = assemble(engine.model, engine.entry, engine.method, engine.mobility, type(engine))
+    made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
     made.specialised.exact = engine.specialised.exact
     made.specialised.addresses = engine.specialised.addresses.copy()
     made.specialised.lists = engine.specialised.lists.copy()

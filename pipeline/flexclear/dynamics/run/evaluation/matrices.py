@@ -9,9 +9,9 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.mechanics import closures as c
-from flexclear.dynamics.mechanics.balance import balanced
-from flexclear.dynamics.mechanics.evaluation import eliminated, placed
-from flexclear.dynamics.mechanics.loops import Loops, jacobian, linked
+from flexclear.dynamics.mechanics.balance import store_holding_forces
+from flexclear.dynamics.mechanics.evaluation import eliminate_coordinates, place_links
+from flexclear.dynamics.mechanics.loops import Loops, factorise_loops, jacobian
 from flexclear.dynamics.mechanics.mechanism import Frame, Link
 from flexclear.dynamics.mechanics.modes import Block, Modes
 from flexclear.dynamics.mechanics.of_topology import mechanism_of
@@ -48,8 +48,8 @@ class Matrices:
                 self._first[block] = int(row["c0"]) + block.at.start
         self._shape = tables.size(m.N_KEPT_ROWS), arrays.size(m.NV) + arrays.size(m.N_DRIVES)
         with self.calls.building():
-            placed(self.mechanism)
-            eliminated(self.mechanism)
+            place_links(self.mechanism)
+            eliminate_coordinates(self.mechanism)
 
     @property
     def factor(self) -> np.ndarray:
@@ -83,7 +83,7 @@ class Matrices:
     def loops(self) -> Loops:
         """The closures, passed to the ground and factorised; once only."""
         with self.calls.building():
-            return linked(self.mechanism, self.calls)
+            return factorise_loops(self.mechanism, self.calls)
 
     def dense(self, rows: Mapping[int, Mapping[Any, c.Rows]]) -> np.ndarray:
         """Return numbers of closure rows, which are given by closure and by what they move, (rows, speeds)."""
@@ -147,7 +147,7 @@ def holding_forces(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
     origin, and forces."""
     tables, calls = on_numbers(engine, engine.h)
     mechanism, nothing = mechanism_of(tables), [0.0] * tables.size(m.N_KEPT_ROWS)
-    balanced(mechanism, nothing, calls)
+    store_holding_forces(mechanism, nothing, calls)
     on_links = [link.rest.F.about(link.motion.p_WB) for link in mechanism.links]
     on_ground = sum((rest.F for rest, _ in mechanism.ground.beyond), Wrench(ZERO, ZERO))
     wrenches = [[*one.moment, *one.force] for one in (on_ground, *on_links)]

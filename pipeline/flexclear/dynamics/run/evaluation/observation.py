@@ -41,7 +41,7 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observe
 
 
 def observe_blocks(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Blocks:
-    """Return the outputs as the kernel stores them; see `equations.observation.by_name`."""
+    """Return the outputs as `observe` stores them; see `equations.observation.by_name`."""
     pieces = engine.pieces[engine.segments(rows[:, 0], after=after)]
     return observe_with(engine, rows, pieces, max(recording.record_share(engine.rtol) * engine.rtol, ROUNDING))
 

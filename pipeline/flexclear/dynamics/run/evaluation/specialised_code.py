@@ -1,6 +1,6 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
-It is compiled once for all scenes of a topology, and compiles and runs faster than kernels. Where it would be too long,
+It is compiled once for all scenes of a topology, and runs faster than a list of calls. Where it would be too long,
 steps run a list of calls of routines. All other evaluations are lists that store what the record has. The topology
 alone decides, so that equal scenes give equal bytes.
 """
@@ -20,7 +20,6 @@ from flexclear.dynamics.compile import functions, sources
 from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.effects import Parts
-from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
@@ -61,7 +60,7 @@ class SpecialisedCode:
 
 def equations(model: Model, mobility: Mobility) -> dict[str, str]:
     """Return the source of specialised steps, by name; none with redundant closure rows, which await a selection."""
-    if INTERPRETED or mobility.redundant:
+    if mobility.redundant:
         return {}
     return {SPECIALISED: sources.specialised(model.parts, topology_of(model.arrays, model.arrays.h))}
 
@@ -69,7 +68,7 @@ def equations(model: Model, mobility: Mobility) -> dict[str, str]:
 def address(model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent) -> int:
     """Return the address of specialised code for closure rows; 0 when there is none."""
     if rows not in code.addresses:
-        code.addresses[rows] = made(model, h, rows, progress, exact=code.exact)
+        code.addresses[rows] = code_address(model, h, rows, progress, exact=code.exact)
     return code.addresses[rows]
 
 
@@ -86,7 +85,7 @@ def call_list(
     of = rows, where
     if of not in code.running:
         if of not in code.lists:
-            given = model.parts, topology_of(model.arrays, selected(model, h, rows)), where
+            given = model.parts, topology_of(model.arrays, with_selection(model, h, rows)), where
             with _making:
                 key, place = repr(given).encode(), where if where in (m.CALLS, m.RECORD_CALLS) else None
                 code.lists[of] = stored(key, lambda: list_of(*given), partial(progress, None), place)
@@ -132,14 +131,14 @@ def evaluated_in_python(model: Model, laws: Callable, where: int = m.RECORD_CALL
     return evaluate
 
 
-def selected(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
+def with_selection(model: Model, h: np.ndarray, rows: bytes) -> np.ndarray:
     """Return a copy of h with the selection of closure rows."""
     h = h.copy()
     selection.write(model, h, np.frombuffer(rows, dtype=bool))
     return h
 
 
-def made(
+def code_address(
     model: Model,
     h: np.ndarray,
     rows: bytes,
@@ -151,7 +150,7 @@ def made(
     """Return the address of code for closure rows, with the requested number of lanes; 0 when there is none."""
     parts, changes = model.parts, bool(h[m.N_CHANGES])
     with _making:  # engines may run concurrently
-        topology = topology_of(model.arrays, selected(model, h, rows))
+        topology = topology_of(model.arrays, with_selection(model, h, rows))
         key = (parts, topology, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:

@@ -39,7 +39,7 @@ def explanation(engine: Any) -> str | None:
 
 def _looked_up(engine: Any, k: int) -> list[tuple[int, list[float]]]:
     """Return the number of each table that load k looks up in the state evaluated last, and where."""
-    from flexclear.dynamics.mechanics.evaluation import placed  # here: they import the compiler
+    from flexclear.dynamics.mechanics.evaluation import place_links  # here: they import the compiler
     from flexclear.dynamics.mechanics.loads import looked_up
     from flexclear.dynamics.mechanics.of_topology import mechanism_of
     from flexclear.dynamics.run.evaluation.matrices import on_numbers
@@ -48,6 +48,6 @@ def _looked_up(engine: Any, k: int) -> list[tuple[int, list[float]]]:
     mechanism = mechanism_of(tables)
     action = mechanism.actions[engine.model.arrays.size(m.N_CONTACTS) + k]
     with calls.building():
-        placed(mechanism)
+        place_links(mechanism)
         found: list[tuple[int, list[float]]] = looked_up(*action.given, *(frame.placed for frame in action.frames))
     return found

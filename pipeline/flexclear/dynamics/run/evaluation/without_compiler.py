@@ -1,88 +1,104 @@
-"""An engine that Python evaluates, kernel by kernel: what a run does at its start is checked without a compiler.
+"""Functions of an engine that Python evaluates, kernel by kernel and routine by routine.
 
-An evaluation takes milliseconds, a thousand times as long as compiled code: enough for a start, not for a run.
+So `check` examines a start without a compiler, and `NUMBA_DISABLE_JIT=1` a run in a debugger. An evaluation takes
+milliseconds, a thousand times as long as compiled code.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import functions, sources
+from flexclear.dynamics.compile.addresses import make_calls
 from flexclear.dynamics.compile.files import PART
-from flexclear.dynamics.integrate import METHODS
-from flexclear.dynamics.model.mobility import Mobility
+from flexclear.dynamics.compile.functions import Arrays
+from flexclear.dynamics.effects import scheme_of
+from flexclear.dynamics.fields import data
+from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.run.evaluation.engine import MAKER, Engine, assemble
 from flexclear.dynamics.run.evaluation.specialised_code import evaluated_in_python, lists_in_python
-from flexclear.system.progress import Progress, silent
+
+#: whether new engines are evaluated in Python
+IN_PYTHON: ContextVar[bool] = ContextVar("in_python", default=INTERPRETED)
+#: places in the header of the addresses of functions and of lists, at which `Uncompiled` writes numbers
+FUNCTIONS, LISTS = (m.EVALUATE, m.RATES, m.PRESCRIBE, m.PROJECT, m.RESOLVE, m.RUN), (m.CLOSE, m.MOVE, m.SPRINGS)
 
 
 @dataclass(frozen=True)
 class Uncompiled(functions.Entry):
-    """Functions of a mechanism that Python evaluates, by their names in `compile.calls`."""
+    """Kernels of a mechanism that Python evaluates: those of its files, `evaluate`, and `calls` of each other."""
 
     kernels: SimpleNamespace
+    compiled: ClassVar[bool] = False
+
+    @classmethod
+    def of(cls, model: Model) -> Uncompiled:
+        """Return the kernels of a model."""
+        return cls({}, _kernels(model))
 
     def connect(self, h: np.ndarray) -> None:
-        """Leave the header as it is: no function calls another one by its address."""
+        """Write a number for each address in the header."""
+        for where in FUNCTIONS:
+            h[where] = where
+        for where in LISTS:
+            h[where] = 2 * PART * where
 
-
-class PythonEngine(Engine):
-    """An engine without compiled functions: it evaluates and observes, and takes no steps."""
-
-    entry: Uncompiled
-
-    def connect(self, progress: Progress = silent) -> None:
-        """Leave the header as it is."""
-
-    def evaluate_laws(self, t: float) -> None:
-        """Store the values and rates of all laws at time t."""
-        self.entry.kernels.laws(*self._numbers(), t)
-
-    def evaluate(self, t: float, repeat: int = 1) -> None:
-        """Store the rate of the state in Y at time t in the first row of SLOPES."""
+    def observe(self, arrays: Arrays, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
+        """Evaluate the outputs of every row; arrays: h, f, w and n."""
         with np.errstate(all="ignore"):  # as in compiled code, unused values may be infinite
-            self.entry.kernels.evaluate(*self._numbers(), t, int(self.h[m.Y]), int(self.h[m.SLOPES]))
+            self.kernels.observation(*arrays, rows, pieces, tolerance, out)
 
-    def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
-        """Evaluate the outputs of every row."""
+    def advance(self, arrays: Arrays, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
+        """Step to the end of the segment or of the budget."""
         with np.errstate(all="ignore"):
-            self.entry.kernels.observe(*self._numbers(), rows, pieces, tolerance, out)
+            while self.kernels.steps(*arrays, outputs, rows, events):
+                self.kernels.calls.awaited(*arrays)
 
-    def _numbers(self) -> tuple[np.ndarray, ...]:
-        return self.h, self.model.arrays.f, self.w, self.n
+    def evaluate(self, arrays: Arrays, t: float, repeat: int) -> None:
+        """Evaluate the state in Y at time t, once."""
+        h = arrays[0]
+        with np.errstate(all="ignore"):
+            self.kernels.evaluate(*arrays, t, int(h[m.Y]), int(h[m.SLOPES]))
 
-
-def uncompiled(model: Model, mobility: Mobility) -> Engine:
-    """Return an engine for the start of a model's run, without compilation."""
-    method = METHODS[model.scene.solver.integrator]
-    return assemble(model, Uncompiled({}, _kernels(model)), method, mobility, PythonEngine)
+    def evaluate_laws(self, arrays: Arrays, t: float) -> None:
+        """Evaluate all laws at time t."""
+        self.kernels.laws(*arrays, t)
 
 
 @contextmanager
 def without_compiler() -> Iterator[None]:
     """Let all engines that are prepared during the context be evaluated in Python."""
-    token = MAKER.set(uncompiled)
+    token = IN_PYTHON.set(True)
     try:
         yield
     finally:
-        MAKER.reset(token)
+        IN_PYTHON.reset(token)
 
 
 def _kernels(model: Model) -> SimpleNamespace:
-    calls = SimpleNamespace(evaluate=evaluated_in_python(model, lambda *given: calls.laws(*given)))
-    run = lists_in_python(model)
-    calls.correct = lambda *given: run(*given, 2 * PART * m.CLOSE)
-    calls.rates = lambda d, *given: calls.evaluate(d.h, d.f, d.w, d.n, *given)
-    for name, kernel, source in sources.for_python(model.parts):
+    """Return the kernels of a model, and `evaluate`."""
+    known = dict[int, Callable]()
+    calls = make_calls(lambda place, given: known[int(place)](*given))
+    made = SimpleNamespace(calls=calls)
+    for name, source in sources.for_python(model.parts, scheme_of(model.scene.solver)):
         scope: dict[str, Any] = {"calls": calls}
         exec(source, scope)
-        setattr(calls, name, scope[kernel])
-    return calls
+        setattr(made, name, scope[name])
+    made.evaluate = evaluated_in_python(model, made.laws)
+    known[m.EVALUATE], known[m.PRESCRIBE], known[m.RUN] = made.evaluate, made.laws, lists_in_python(model)
+    known[m.RATES] = evaluated_in_python(model, made.laws, m.CALLS)
+    if model.parts.closures:
+        known[m.PROJECT] = made.projection
+    if hasattr(made, "resolution"):
+        known[m.RESOLVE] = lambda h, f, w, n, step, t, rows, count, width, events, *_: made.resolution(
+            data(h, f, w, n), step, t, rows, events
+        )
+    return made

@@ -24,7 +24,6 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.integrate import recording
-from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.model.arrays import Arrays, pack
 from flexclear.dynamics.run.evaluation.engine import Engine, assemble
 from flexclear.dynamics.run.pieces import Tape
@@ -98,7 +97,7 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
     Raises SolverError for a mechanism that is not differentiated.
     """
     model, count = engine.model, len(directions)
-    if INTERPRETED:
+    if not engine.entry.compiled:
         raise SolverError("derivatives need compiled code: unset NUMBA_DISABLE_JIT")
     if any(isinstance(load, SampledPid) for load in model.scene.load.values()):
         raise SolverError("derivatives do not support sampled controllers: use a continuous 'pid'")
