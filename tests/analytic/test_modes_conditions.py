@@ -18,7 +18,7 @@ from flexclear.structure.fe.recipe import read_recipe
 from flexclear.structure.fe.statics import Flexibility, support
 from flexclear.structure.kinds import kind
 from flexclear.structure.kinds.kind import of_mesh
-from flexclear.structure.modes import bundle, deficits, eigen
+from flexclear.structure.modes import bundle, deficits, normal
 from flexclear.structure.modes.basis import ModeRequest
 from flexclear.structure.modes.solution import solve
 from flexclear.system.errors import InputError
@@ -61,8 +61,8 @@ def test_complete_sets_span_the_same_space(rod: xr.Dataset, body: Flexibility, c
     fraction = deficits.of_basis(body, model.interfaces, vectors) / deficits.full(body, model.interfaces)
     # the eigenvalues of the basis span 1e9; what is left of rounding in a static answer is about its root
     np.testing.assert_allclose(fraction, 1.0, rtol=0.0, atol=1e-7)
-    values, _ = eigen.rediagonalise(model.stiffness, model.mass, body.remove_momentum(vectors))
-    full = eigen.dense_eigenpairs(model.stiffness, model.mass, 78)[0][6:]
+    values, _ = normal.rediagonalise(model.stiffness, model.mass, body.remove_momentum(vectors))
+    full = normal.dense_eigenpairs(model.stiffness, model.mass, 78)[0][6:]
     # eps times the ratio of the largest to the lowest eigenvalue is 1e-7 as a bound
     np.testing.assert_allclose(values, full, rtol=2e-7)
 
@@ -109,7 +109,7 @@ def test_dense_and_sparse_solvers_agree_on_held_functionals(
 
     held = rows(body.model)
     dense = normal.lowest(body.model, held, 8, lambda: body, silent)
-    monkeypatch.setattr(eigen, "DENSE_LIMIT", 10)
+    monkeypatch.setattr(normal, "DENSE_LIMIT", 10)
     sparse = normal.lowest(body.model, held, 8, lambda: body, silent)
     # eigenvalues span 1.2e6: the lowest is known to eps times that, 2.6e-10; ten times that
     np.testing.assert_allclose(sparse.values, dense.values, rtol=3e-9)

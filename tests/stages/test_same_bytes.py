@@ -46,7 +46,7 @@ def test_a_task_has_one_thread_whoever_has_set_more() -> None:
 #: docstrings of a module, a class and a compiled kernel, which become references, titles and meanings of keys
 DOCSTRINGS = """
 from importlib import import_module
-from flexclear.scene.citations import docstring
+from flexclear.scene.provenance import docstring
 places = [("integrate.dop853", ""), ("contact.normal.hertz", ""), ("contact.law", "Hysteresis")]
 for module, name in places:
     thing = import_module(f"flexclear.dynamics.{module}")

@@ -21,7 +21,7 @@ from flexclear.artifacts.paths import DATA, results_root
 from flexclear.artifacts.store import PARTIAL, Store
 from flexclear.post.pages import media
 from flexclear.post.plotting.table import as_html, from_markdown
-from flexclear.scene import lines
+from flexclear.scene import toml_files
 from flexclear.scene.load import is_file, load_scene, scene_name, table_with_changes
 from flexclear.scene.plausibility import implausible_values
 from flexclear.scene.quantity import KINDS, parse
@@ -300,7 +300,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
             by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
         except InputError as error:
             wrong += errors_of(error)
-    refuse([lines.with_line_number(error) for error in wrong])
+    refuse([toml_files.with_line_number(error) for error in wrong])
     _refuse_namesakes([graph.scene for graph in by_scene.values()])
     return list(by_scene.values())
 
@@ -311,7 +311,7 @@ def errors_in_file(path: Path | None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise lines.with_file_name(error, path) from None
+        raise toml_files.with_file_name(error, path) from None
 
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
@@ -329,7 +329,7 @@ def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
     """Print plausibility warnings; raise InputErrors for dangling names. Both come before any computation."""
     require_names(scene)
     for warning in implausibilities(scene, settings):
-        print(f"flexclear: {WARNING}{lines.with_line_number(warning)}", file=sys.stderr)
+        print(f"flexclear: {WARNING}{toml_files.with_line_number(warning)}", file=sys.stderr)
 
 
 def require_names(scene: Scene) -> None:

@@ -8,12 +8,11 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.structure.fe.model import Interface, Model, SecondOrder
+from flexclear.structure.fe.model import Interface, Kind, Model, SecondOrder
 from flexclear.structure.fe.solid import mesh as meshes
 from flexclear.structure.fe.solid import prestress
 from flexclear.structure.fe.solid.model import assemble, solid_of, unknowns_of
 from flexclear.structure.fe.statics import Flexibility, border, support
-from flexclear.structure.kinds.interface import Kind
 
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5
