@@ -17,7 +17,7 @@ from flexclear.structure.fe.statics import Flexibility, support
 from flexclear.structure.kinds import kind
 from flexclear.structure.kinds.kind import of_mesh
 from flexclear.structure.modes import normal, reference
-from flexclear.structure.modes.condition import Condition, check
+from flexclear.structure.modes.reference import Condition, check
 from flexclear.structure.modes.solution import solve
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import silent

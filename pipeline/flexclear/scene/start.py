@@ -1,4 +1,4 @@
-"""The start of a run, where it is given by more than the bodies' poses and velocities."""
+"""The start of a run, where it is given by more than the bodies' poses and velocities, such as a row of another run."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A sweep: one scene, the parameters varied in it, and the quantities recorded of every point. See docs/sweeps.md."""
+"""A sweep: one scene, the parameters varied in it, its points, and what is recorded of each. See docs/sweeps.md."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ def load_sweep(path: Path) -> Sweep:
 
 
 #: a value of a parameter in a scene: a number in SI, text with an SI unit, or anything else as written
-Value = Any
+AnyValue = Any
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ class Axis:
 
     name: str
     places: tuple[str, ...]
-    values: tuple[Value, ...]
+    values: tuple[AnyValue, ...]
     unit: str
     written: str = ""
 
@@ -275,7 +275,7 @@ class Design:
         """Names of the dimensions: the parameters, or ``point``."""
         return tuple(axis.name for axis in self.axes) if self.grid else ("point",)
 
-    def points(self) -> list[dict[str, Value]]:
+    def points(self) -> list[dict[str, AnyValue]]:
         """Return the points in order, each as key path of the scene -> value."""
         combined = (itertools.product if self.grid else zip)(*(axis.values for axis in self.axes))
         return [
@@ -324,7 +324,7 @@ def _axis_of_numbers(sweep: Sweep, name: str, numbers: np.ndarray) -> Axis:
     return Axis(name, sweep.places(name), values, unit, unit and _unit_as_written(given.first or given.mean))
 
 
-def _unit_as_written(value: Value) -> str:
+def _unit_as_written(value: AnyValue) -> str:
     """Return the unit with which a number was written."""
     return value.strip().partition(" ")[2].strip() if isinstance(value, str) else ""
 
@@ -343,7 +343,7 @@ def _unit_points(sample: Sample, parameters: int) -> np.ndarray:
     return np.clip(drawn, np.finfo(float).eps, 1.0 - np.finfo(float).eps)
 
 
-def _is_number(value: Value) -> bool:
+def _is_number(value: AnyValue) -> bool:
     try:
         number_and_unit(value)
     except ValueError:

@@ -1,4 +1,7 @@
-"""Reading of TOML files, and the frames that the file of a mesh recipe names."""
+"""TOML files: their tables, the line on which a key path like ``body.rod.mesh`` is written, and syntax errors in words.
+
+The reader of the standard library gives no line numbers of keys, so they are searched for in the text.
+"""
 
 from __future__ import annotations
 

@@ -106,12 +106,11 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     """
     examine(scene)
     workplace = workplace or open_workplace()
-    from flexclear.artifacts import modal as modal  # gives the dataset its accessor
 
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: a worker would run a caller's script again from its top
     (made,) = workplace.datasets(task, jobs=1)
-    from flexclear.artifacts.table import with_dataframe
+    from flexclear.artifacts.coordinates import with_dataframe
 
     return with_dataframe(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)), scene, run_head)
 
@@ -122,8 +121,6 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     InputError without results, or for a file with other contents.
     """
     import xarray as xr
-
-    from flexclear.artifacts import modal as modal
 
     if str(scene).endswith(".nc"):
         path = Path(str(scene))
@@ -181,7 +178,7 @@ def bundles(scene: Scene, workplace: Workplace | None = None) -> dict[str, xr.Da
 
 def deficits(graph: Graph, workplace: Workplace) -> str:
     """Return a table for each flexible body of what its bundle lacks."""
-    from flexclear.artifacts.deficits import table
+    from flexclear.artifacts.compliance import table
 
     reduced = dict(zip(graph.bundle, workplace.datasets(*graph.bundle.values()), strict=True))
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())

@@ -1,4 +1,4 @@
-"""Meshes and models by the kind of body."""
+"""Meshes and models by the kind of body; bodies given by the matrices of another code, as a kind."""
 
 from __future__ import annotations
 

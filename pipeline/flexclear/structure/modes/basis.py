@@ -13,8 +13,8 @@ import numpy as np
 from flexclear.structure.fe.model import Interface, Model
 from flexclear.structure.fe.statics import Flexibility, border
 from flexclear.structure.modes import deficits, normal
-from flexclear.structure.modes.condition import Condition
 from flexclear.structure.modes.normal import WHERE, Normal
+from flexclear.structure.modes.reference import Condition
 from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress
 
@@ -173,7 +173,7 @@ def _has_enough_modes(body: Body, static: np.ndarray, modes: Normal, count: int,
         return bool(following.size == 0 or normal.frequency(following)[0] > requested.up_to)
     vectors = _static_and_normal_shapes(body, static, modes, count)
     if requested.compliance is not None:
-        return deficits.least(body.flexibility(), body.interfaces, vectors)[0] >= requested.compliance
+        return deficits.least_fraction(body.flexibility(), body.interfaces, vectors)[0] >= requested.compliance
     return requested.mass is not None and _mass_fraction(body.model, vectors) >= requested.mass
 
 
@@ -188,7 +188,7 @@ def _mass_fraction(model: Model, vectors: np.ndarray) -> float:
 def _unreachable_error(body: Body, static: np.ndarray, modes: Normal, requested: ModeRequest) -> InputError:
     vectors = _static_and_normal_shapes(body, static, modes, len(modes.values))
     if requested.compliance is not None:
-        fraction, where = deficits.least(body.flexibility(), body.interfaces, vectors)
+        fraction, where = deficits.least_fraction(body.flexibility(), body.interfaces, vectors)
         problem = f"with every mode of this reference condition the basis has {fraction:.3g} of the compliance {where}"
         return InputError("modes.compliance", problem, 'choose one with static shapes, as reference = "craig-bampton"')
     fraction = _mass_fraction(body.model, vectors)

@@ -36,7 +36,7 @@ from flexclear.artifacts.compliance import fractions, frame_compliance
 from flexclear.structure.fe.model import DIRECTIONS, Interface, Model
 from flexclear.structure.fe.statics import Flexibility
 from flexclear.structure.modes import normal
-from flexclear.structure.modes.condition import in_own_axes
+from flexclear.structure.modes.reference import in_own_axes
 from flexclear.system.progress import Progress
 
 #: frequencies of the error bound, as fractions of the free body's first frequency
@@ -158,7 +158,9 @@ def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vector
     return frame_compliance(motion, rigid, relief * scale, inner)
 
 
-def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
+def least_fraction(
+    flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray
+) -> tuple[float, str]:
     """Return the least compliance fraction between interfaces (of a single one: of the free body), and its location."""
     whole = full(flexibility, interfaces)
     each = fractions(of_basis(flexibility, interfaces, vectors), whole)

@@ -1,4 +1,8 @@
-"""Normal modes of a body with held motions, or of the free body without its rigid modes."""
+"""Normal modes of a body with held motions, or of the free body without its rigid modes.
+
+The symmetric eigenproblem K x = lambda M x is solved from its lower end, with equal results in every process; axes and
+signs that it leaves open, and the family of each mode, are chosen here.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,7 @@ import scipy.sparse.linalg
 from flexclear.numerics.rotations import index_of_largest
 from flexclear.structure.fe.model import Model, own_dofs
 from flexclear.structure.fe.statics import Flexibility, border
-from flexclear.structure.sparse.multifrontal import negative_pivots
+from flexclear.structure.sparse import negative_pivots
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress
 

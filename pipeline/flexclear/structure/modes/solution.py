@@ -16,8 +16,7 @@ from flexclear.structure.fe.statics import Flexibility, support
 from flexclear.structure.kinds.kind import of_mesh
 from flexclear.structure.modes import basis, deficits, imported, normal
 from flexclear.structure.modes.basis import ModeRequest
-from flexclear.structure.modes.condition import Condition, Given, check
-from flexclear.structure.modes.reference import CONDITIONS
+from flexclear.structure.modes.reference import CONDITIONS, Condition, Given, check
 from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress, silent
 
