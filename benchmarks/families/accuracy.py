@@ -14,7 +14,7 @@ from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
 from flexclear.artifacts.paths import results_root
-from flexclear.post.cost.answer import sentences
+from flexclear.post.cost.study import sentences
 from flexclear.post.plotting.table import Table, as_markdown, from_markdown
 from flexclear.scene.load import load_scene
 from flexclear.stages.scenes import find_scene, open_workplace

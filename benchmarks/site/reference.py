@@ -12,7 +12,7 @@ from flexclear.artifacts.coordinates import COORDINATES
 from flexclear.artifacts.schema import Schema
 from flexclear.post.plotting.table import Table, as_csv
 from flexclear.post.sections.verdict import VERDICT
-from flexclear.post.single_run.schema import POST
+from flexclear.post.single_run.series import POST
 from flexclear.scene.quantity import CONTACT_REDUCTIONS, KINDS, OWNERS, SERIES, WORDS, Kind
 
 RECIPES = DOCS / "examples" / "datasets"

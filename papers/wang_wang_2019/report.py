@@ -217,7 +217,7 @@ def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | 
     text = "\n\n".join(
         f"### {head}\n\n{body}" if head else body for head, body in parts if not headings or head in headings
     )
-    return _pictures(_html(text), page.parent, pictures)
+    return _pictures(_html(text, page.parent), page.parent, pictures)
 
 
 def _parts(text: str) -> list[tuple[str, str]]:
@@ -226,12 +226,19 @@ def _parts(text: str) -> list[tuple[str, str]]:
     return [("", pieces[0].strip()), *((pieces[k].strip(), pieces[k + 1].strip()) for k in range(1, len(pieces), 2))]
 
 
-def _html(text: str) -> str:
+def _html(text: str, folder: Path) -> str:
     from markdown_it import MarkdownIt
 
+    def link(match: re.Match[str]) -> str:
+        """Return a link to a table with the table inside; links between pages lead nowhere in one file."""
+        file = folder / match[1]
+        if file.suffix != ".csv" or not file.is_file():
+            return f"<i>{match[2]}</i>"
+        data = base64.b64encode(file.read_bytes()).decode()
+        return f"<a download='{file.name}' href='data:text/csv;base64,{data}'>{match[2]}</a>"
+
     made: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
-    # links between pages lead nowhere in one file
-    made = re.sub(r'<a href="(?!https?:|#)[^"]*">(.*?)</a>', r"<i>\1</i>", made, flags=re.DOTALL)
+    made = re.sub(r'<a href="(?!https?:|#)([^"]*)">(.*?)</a>', link, made, flags=re.DOTALL)
     made = made.replace("<table>", "<figure><div class='scroll'><table class='sorts'>").replace(
         "</table>", "</table></div></figure>"
     )

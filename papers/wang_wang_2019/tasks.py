@@ -13,7 +13,7 @@ from papers import PROJECT
 from papers.wang_wang_2019 import DOCUMENTS, figures, timing
 
 #: code that decides figures, tables and the page
-CODE = (*PUBLISHING, __package__)
+CODE = (*PUBLISHING, "papers.comparison", __package__)
 #: files with parts that the page shows, below the folder of the sources: pages, their pictures, variants of scenes
 PAGES = [pattern for name in DOCUMENTS for pattern in (f"docs/{name}.md", f"docs/{name}/*.png")]
 PAGES += ["scenes/sps4/variants/*.toml"]

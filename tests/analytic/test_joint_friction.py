@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
-from flexclear.dynamics.effects.joint_friction import BALL
+from flexclear.dynamics.effects.declared import BALL
 from flexclear.dynamics.mechanics.bearings import solution
 from flexclear.dynamics.mechanics.evaluation import loads_of
 from flexclear.dynamics.routines.calls import CallList

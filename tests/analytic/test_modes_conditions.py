@@ -10,15 +10,13 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 import xarray as xr
 
-from flexclear.artifacts import compliance as core
-from flexclear.artifacts import deficits as words
-from flexclear.artifacts import modal
+from flexclear.artifacts import compliance
 from flexclear.structure.fe.model import Model
 from flexclear.structure.fe.recipe import read_recipe
 from flexclear.structure.fe.statics import Flexibility, support
 from flexclear.structure.kinds import kind
 from flexclear.structure.kinds.kind import of_mesh
-from flexclear.structure.modes import bundle, deficits, eigen
+from flexclear.structure.modes import bundle, deficits, normal
 from flexclear.structure.modes.basis import ModeRequest
 from flexclear.structure.modes.solution import solve
 from flexclear.system.errors import InputError
@@ -61,8 +59,8 @@ def test_complete_sets_span_the_same_space(rod: xr.Dataset, body: Flexibility, c
     fraction = deficits.of_basis(body, model.interfaces, vectors) / deficits.full(body, model.interfaces)
     # the eigenvalues of the basis span 1e9; what is left of rounding in a static answer is about its root
     np.testing.assert_allclose(fraction, 1.0, rtol=0.0, atol=1e-7)
-    values, _ = eigen.rediagonalise(model.stiffness, model.mass, body.remove_momentum(vectors))
-    full = eigen.dense_eigenpairs(model.stiffness, model.mass, 78)[0][6:]
+    values, _ = normal.rediagonalise(model.stiffness, model.mass, body.remove_momentum(vectors))
+    full = normal.dense_eigenpairs(model.stiffness, model.mass, 78)[0][6:]
     # eps times the ratio of the largest to the lowest eigenvalue is 1e-7 as a bound
     np.testing.assert_allclose(values, full, rtol=2e-7)
 
@@ -109,7 +107,7 @@ def test_dense_and_sparse_solvers_agree_on_held_functionals(
 
     held = rows(body.model)
     dense = normal.lowest(body.model, held, 8, lambda: body, silent)
-    monkeypatch.setattr(eigen, "DENSE_LIMIT", 10)
+    monkeypatch.setattr(normal, "DENSE_LIMIT", 10)
     sparse = normal.lowest(body.model, held, 8, lambda: body, silent)
     # eigenvalues span 1.2e6: the lowest is known to eps times that, 2.6e-10; ten times that
     np.testing.assert_allclose(sparse.values, dense.values, rtol=3e-9)
@@ -133,9 +131,9 @@ def test_modes_up_to_a_share_of_the_compliance(rod: xr.Dataset, body: Flexibilit
     ends = (body.model.interfaces[0], body.model.interfaces[3])
     found = solve(rod, "free-free", requested=ModeRequest(compliance=0.9))
     n = found.sizes["mode"]
-    assert deficits.least(body, ends, found["vector"].values)[0] >= 0.9
+    assert deficits.least_fraction(body, ends, found["vector"].values)[0] >= 0.9
     # the next smaller whole basis would not do
-    assert deficits.least(body, ends, found["vector"].values[:, : n - 2])[0] < 0.9
+    assert deficits.least_fraction(body, ends, found["vector"].values[:, : n - 2])[0] < 0.9
     assert solve(rod, "craig-bampton", requested=ModeRequest(compliance=1.0 - 1e-9)).sizes["mode"] == 6
 
 
@@ -239,7 +237,7 @@ def test_the_compliance_fractions_of_a_bundle_follow_from_its_own_numbers(
     rod: xr.Dataset, condition: str, count: int
 ) -> None:
     data = bundle.build(rod, solve(rod, condition, count))
-    found = core.fractions(core.of_bundle(data), data["compliance_full"].values)
+    found = compliance.fractions(compliance.of_bundle(data), data["compliance_full"].values)
     np.testing.assert_allclose(found, data["compliance_share"].values, rtol=0.0, atol=1e-9)
     assert np.all(data["compliance_share"].values <= 1.0 + 1e-9)
 
@@ -299,46 +297,22 @@ def test_effective_mass_of_a_complete_clamped_basis_is_what_can_move(rod: xr.Dat
     np.testing.assert_allclose(data["effective_mass"].sum("mode").values, expected, rtol=1e-9)
 
 
-def test_truncation_keeps_every_variable_together(rod: xr.Dataset) -> None:
-    """Fewer modes of a larger free basis are the smaller free basis."""
-    large, small = (bundle.build(rod, solve(rod, "free-free", n)) for n in (13, 7))
-    cut = large.modal.truncate(7)
-    assert isinstance(large.modal, modal.Modal)
-    assert cut.modal.count == cut.attrs["count"] == 7
-    assert set(small.data_vars) - set(cut.data_vars) == {"error_bound"}
-    for name in cut.data_vars:
-        expected = small[name].values
-        scale = np.abs(expected).max() if expected.dtype.kind == "f" else 1.0
-        np.testing.assert_allclose(cut[name].values, expected, rtol=0.0, atol=1e-9 * max(scale, 1e-3), err_msg=name)
-    with pytest.raises(InputError, match="split a pair"):
-        large.modal.truncate(6)
-    with pytest.raises(InputError, match="0 of 13 modes"):
-        large.modal.truncate(0)
-
-
-def test_a_run_is_truncated_too() -> None:
-    run = xr.Dataset(
-        {"modal_coordinate": (("time", "mode"), np.arange(6.0).reshape(2, 3)), "kinetic": ("time", [1.0, 2.0])}
-    )
-    np.testing.assert_array_equal(run.modal.truncate(2)["modal_coordinate"].values, [[0.0, 1.0], [3.0, 4.0]])
-
-
 def test_warnings_name_what_is_missing_where_joints_are(rod: xr.Dataset) -> None:
     found = {name: bundle.build(rod, solve(rod, name, count)) for name, count in BASES}
-    (fixed,) = words.warnings(found["fixed-fixed"], ("bottom", "top"), "rod1")
+    (fixed,) = compliance.warnings(found["fixed-fixed"], ("bottom", "top"), "rod1")
     assert "rod1: its fixed-fixed modes" in fixed
     assert "'bottom'" in fixed
     assert "z 0 %" in fixed
     assert 'interfaces = ["bottom", "top"]' in fixed
-    (free,) = words.warnings(found["free-free"], ("bottom", "top"))
+    (free,) = compliance.warnings(found["free-free"], ("bottom", "top"))
     assert "z 0 %" in free
-    assert words.warnings(found["craig-bampton"], ("bottom", "top")) == []
+    assert compliance.warnings(found["craig-bampton"], ("bottom", "top")) == []
     # the same basis with a joint where it has no constraint modes
-    assert len(words.warnings(found["craig-bampton"], ("at_120mm", "top"))) == 1
+    assert len(compliance.warnings(found["craig-bampton"], ("at_120mm", "top"))) == 1
 
 
 def test_the_table_says_it_all(rod: xr.Dataset) -> None:
-    text = words.table(bundle.build(rod, solve(rod, "fixed-fixed", 7)))
+    text = compliance.table(bundle.build(rod, solve(rod, "fixed-fixed", 7)))
     assert "none; the first is at 1564.49 Hz" in text
     assert "the body frame moves with the clamped 'start' and 'end'" in text
     row = next(line for line in text.splitlines() if line.split()[:2] == ["top", "bottom"])

@@ -18,7 +18,7 @@ import scipy.sparse
 import xarray as xr
 
 import flexclear as fc
-from flexclear.artifacts.deficits import table
+from flexclear.artifacts.compliance import table
 from flexclear.commands.__main__ import main
 from flexclear.structure.fe.exchange import ansys, files, nodes, programs
 from flexclear.structure.kinds import kind

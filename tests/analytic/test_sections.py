@@ -12,7 +12,7 @@ from flexclear import dynamics
 from flexclear.commands.__main__ import main
 from flexclear.commands.sections import write_page
 from flexclear.dynamics import analyses
-from flexclear.post.sections import chaos
+from flexclear.post.sections import verdict
 from flexclear.post.sections.verdict import derive, judge
 from flexclear.scene.load import edited
 from flexclear.scene.schema import Scene
@@ -87,7 +87,7 @@ def test_its_approach_to_the_fixed_point_contracts_by_the_derivative_there() -> 
         states.append([x])
         x = 2.8 * x * (1.0 - x)
     # derivative at the fixed point 1 - 1/r: 2 - r; the first steps are not linear yet
-    assert chaos.contraction(np.array(states)[5:]) == pytest.approx(0.8, rel=0.02)
+    assert verdict.contraction(np.array(states)[5:]) == pytest.approx(0.8, rel=0.02)
 
 
 def test_the_circle_map_below_its_critical_coupling_is_quasi_periodic() -> None:

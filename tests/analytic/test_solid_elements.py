@@ -7,13 +7,12 @@ import scipy.sparse.linalg
 from skfem import Basis, ElementHex1, ElementTetP2, ElementVector, MeshHex, MeshTet2
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from flexclear.structure.fe.solid import elasticity, lattice
+from flexclear.structure.fe.solid import elasticity, geometry
 from flexclear.structure.fe.solid.elasticity import Solid
 from flexclear.structure.fe.solid.elements import ELEMENTS, shape_functions
 from flexclear.structure.fe.solid.geometry import Geometry, check
 from flexclear.structure.kinds.kind import of_mesh
-from flexclear.structure.sparse.dissection import dissect
-from flexclear.structure.sparse.multifrontal import Front, cholesky, negative_pivots
+from flexclear.structure.sparse import Front, cholesky, dissect, negative_pivots
 from flexclear.system.errors import InputError, SolverError
 from tests.analytic.solid_models import block, build
 
@@ -22,7 +21,7 @@ LAME, SHEAR = lame_parameters(7.17e10, 0.33)
 
 def distorted(element: str) -> tuple[np.ndarray, np.ndarray]:
     """A box of 2 x 2 x 2 cells whose inner corner is moved; straight edges."""
-    nodes, cells = lattice.cut_cells(*lattice.box_cells((1.0, 0.8, 0.6), (2, 2, 2)), element)
+    nodes, cells = geometry.cut_cells(*geometry.box_cells((1.0, 0.8, 0.6), (2, 2, 2)), element)
     corner = np.abs(nodes - [0.5, 0.0, 0.0])
     hat = np.clip(1.0 - corner / [0.5, 0.4, 0.3], 0.0, None).prod(axis=1)
     return nodes + hat[:, None] * [0.07, -0.05, 0.06], cells
@@ -75,21 +74,21 @@ def test_matrices_are_those_of_scikit_fem(element: str) -> None:
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_mass_is_that_of_the_volume(element: str) -> None:
     """A box to rounding; a cylinder as its quadratic sides let it: (quarter arc / 4)^4 / 90 or so of the area."""
-    nodes, cells = lattice.cut_cells(*lattice.box_cells((0.3, 0.2, 0.1), (2, 1, 2)), element)
+    nodes, cells = geometry.cut_cells(*geometry.box_cells((0.3, 0.2, 0.1), (2, 1, 2)), element)
     assert elasticity.mass(solid(element, nodes, cells)).sum() == pytest.approx(2740.0 * 6e-3, rel=1e-13)
-    nodes, cells = lattice.cut_cells(*lattice.cylinder(0.01, 0.05, 2, 4, 1), element)
+    nodes, cells = geometry.cut_cells(*geometry.cylinder(0.01, 0.05, 2, 4, 1), element)
     tolerance = {"hex8": 3e-2, "tet4": 2e-2}.get(element, 1e-4)
     exact = 2740.0 * np.pi * 1e-4 * 0.05
     assert elasticity.mass(solid(element, nodes, cells)).sum() == pytest.approx(exact, rel=tolerance)
 
 
 def test_cells_that_are_inside_out_or_oddly_numbered_are_refused() -> None:
-    nodes, cells = lattice.cut_cells(*lattice.box_cells((1.0, 1.0, 1.0), (2, 1, 1)), "hex8")
+    nodes, cells = geometry.cut_cells(*geometry.box_cells((1.0, 1.0, 1.0), (2, 1, 1)), "hex8")
     wrong = cells.copy()
     wrong[1] = wrong[1, [4, 5, 6, 7, 0, 1, 2, 3]]
     with pytest.raises(InputError, match=r"1 of 2 cells are inverted or flat .*: 1\n.*right-handed"):
         check(Geometry("hex8", nodes, wrong, {}, {}), "recipe")
-    nodes, cells = lattice.box_cells((1.0, 1.0, 1.0), (2, 1, 1))
+    nodes, cells = geometry.box_cells((1.0, 1.0, 1.0), (2, 1, 1))
     wrong = cells.copy()
     wrong[:, [8, 9]] = wrong[:, [9, 8]]
     with pytest.raises(InputError, match=r"far from the middle of its corners.*\n.*node order"):
@@ -97,7 +96,7 @@ def test_cells_that_are_inside_out_or_oddly_numbered_are_refused() -> None:
 
 
 def test_a_body_in_two_pieces_is_refused() -> None:
-    nodes, cells = lattice.cut_cells(*lattice.box_cells((1.0, 1.0, 1.0), (1, 1, 1)), "hex20")
+    nodes, cells = geometry.cut_cells(*geometry.box_cells((1.0, 1.0, 1.0), (1, 1, 1)), "hex20")
     both = np.vstack([nodes, nodes + np.array([2.0, 0.0, 0.0])])
     with pytest.raises(InputError, match=r"in 2 pieces without common nodes \(of 1, 1 cells\)\n.*merge"):
         check(Geometry("hex20", both, np.vstack([cells, cells + len(nodes)]), {}, {}), "recipe")
@@ -123,7 +122,7 @@ def test_the_drawn_boundary_is_closed_and_has_the_area_of_the_body(element: str)
 @pytest.fixture(scope="module")
 def clamped() -> tuple[sp.csr_array, np.ndarray]:
     """Stiffness of a box held at one end, and places of its rows; with a row that couples to a whole face."""
-    nodes, cells = lattice.cut_cells(*lattice.box_cells((1.0, 0.6, 0.5), (7, 5, 4)), "hex20")
+    nodes, cells = geometry.cut_cells(*geometry.box_cells((1.0, 0.6, 0.5), (7, 5, 4)), "hex20")
     one = np.ones(len(cells))
     K = elasticity.stiffness(Solid("hex20", nodes, cells, one, one, one))
     free = np.flatnonzero(np.repeat(nodes[:, 0] > 0.0, 3))

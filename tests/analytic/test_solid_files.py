@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.structure.fe.solid import lattice
+from flexclear.structure.fe.solid import geometry
 from flexclear.structure.fe.solid.elements import ELEMENTS
 from flexclear.structure.modes.solution import solve
 from flexclear.system.errors import InputError
@@ -22,7 +22,7 @@ SIZE = (0.1, 0.02, 0.03)
 
 def box(element: str) -> tuple[np.ndarray, np.ndarray]:
     """A box of 4 x 1 x 1 cells, or 24 tetrahedra for each."""
-    return lattice.cut_cells(*lattice.box_cells(SIZE, (4, 1, 1)), element)
+    return geometry.cut_cells(*geometry.box_cells(SIZE, (4, 1, 1)), element)
 
 
 def recipe(file: str, unit: str = "mm", **changes: Any) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def test_materials_and_frames_by_physical_names(tmp_path: Path) -> None:
 
 def test_gmsh_4_names_curves_and_points_as_well_as_regions(tmp_path: Path) -> None:
     """A file as Gmsh 4.15 writes it, whose volume is bounded by surfaces with higher numbers than it has cells."""
-    nodes, cells = lattice.cut_cells(*lattice.box_cells(SIZE, (1, 1, 1)), "hex8")
+    nodes, cells = geometry.cut_cells(*geometry.box_cells(SIZE, (1, 1, 1)), "hex8")
     foot = np.flatnonzero(nodes[:, 0] < 1e-9)[[0, 1, 3, 2]]
     entities = ["0 0 1 1", "5 0 -10 -15 0 10 15 1 1 0", "1 0 -10 -15 100 10 15 1 2 2 5 -26"]
     places = [f"{k + 1}" for k in range(8)] + [" ".join(map(repr, (1e3 * x).tolist())) for x in nodes]
@@ -124,7 +124,7 @@ def test_a_number_of_faces_and_of_cells_names_the_faces_to_a_frame(tmp_path: Pat
 
 
 def test_a_number_of_each_cell_is_no_region(tmp_path: Path) -> None:
-    nodes, cells = lattice.cut_cells(*lattice.box_cells(SIZE, (11, 10, 10)), "hex8")
+    nodes, cells = geometry.cut_cells(*geometry.box_cells(SIZE, (11, 10, 10)), "hex8")
     data = {"id": [np.arange(len(cells))], "part": [np.arange(len(cells)) // 550]}
     meshio.Mesh(1e3 * nodes, [("hexahedron", cells)], cell_data=data).write(tmp_path / "box.vtu")
     frames = {"bottom": {"on": {"region": "id=5"}, "tie": "mean"}}
@@ -186,7 +186,7 @@ def write(path: Path, cells: list[tuple[str, np.ndarray]], nodes: np.ndarray) ->
 
 def test_files_that_hold_no_body_are_refused(tmp_path: Path) -> None:
     nodes, cells = box("hex8")
-    tets = lattice.cut_cells(*lattice.box_cells(SIZE, (1, 1, 1)), "tet4")
+    tets = geometry.cut_cells(*geometry.box_cells(SIZE, (1, 1, 1)), "tet4")
     write(tmp_path / "mixed.vtu", [("hexahedron", cells), ("tetra", tets[1])], np.vstack([nodes, tets[0]]))
     write(tmp_path / "shell.vtu", [("quad", cells[:, :4])], nodes)
     write(tmp_path / "wedge.vtu", [("wedge", cells[:, :6])], nodes)

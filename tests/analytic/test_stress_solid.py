@@ -14,11 +14,11 @@ import xarray as xr
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 import flexclear as fc
-from flexclear.artifacts import modal  # noqa: F401  (registers `dataset.modal`)
+import flexclear.artifacts.compliance
 from flexclear.numerics.rotations import components, matrices, principal, von_mises
+from flexclear.post import body_shape
 from flexclear.post.render import player
 from flexclear.post.render.mechanism import mechanism
-from flexclear.post.shapes import body_shape
 from flexclear.post.single_run.series import derive
 from flexclear.scene.load import load_scene
 from flexclear.structure.fe.solid.elements import ELEMENTS
@@ -416,9 +416,3 @@ def test_a_run_without_stress_has_no_picture_of_it(tmp_path: Path) -> None:
     bare = run.drop_vars([name for name in run if "gauge" in run[name].dims])
     with pytest.raises(FlexclearError, match=r"--what stress.*\n.*\[output\] stress"):
         mechanism(bare, {}, stressed=True)
-
-
-def test_fewer_modes_of_a_bundle_have_no_stress_fields(tmp_path: Path) -> None:
-    """What all shapes lack is not what fewer of them lack."""
-    bundle, _ = cantilever(tmp_path, block("hex8", (6, 2, 1), SIZE, "mean"), CB)
-    assert "stress_field" not in bundle.modal.truncate(8)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
@@ -106,3 +108,17 @@ def test_tables_of_the_paper_page_are_whole(content):
     for above, line in pairwise(lines):
         if above.startswith("|") and line.startswith("|"):
             assert line.count("|") == above.count("|"), line
+
+
+def test_a_link_to_a_whole_table_holds_the_table(tmp_path: Path) -> None:
+    """A page that is one file has no folder of tables beside it; links to other pages stay text."""
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "far.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# Page\n\n[All 1 rows](tables/far.csv), [gone](tables/gone.csv), [more](other.md).\n", encoding="utf-8"
+    )
+    shown = report.section(page)
+    (data,) = re.findall(r"<a download='far.csv' href='data:text/csv;base64,([^']+)'>All 1 rows</a>", shown)
+    assert base64.b64decode(data) == b"a,b\n1,2\n"
+    assert "<i>gone</i>, <i>more</i>" in shown

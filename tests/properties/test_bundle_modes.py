@@ -16,8 +16,8 @@ from flexclear.structure.fe.recipe import read_recipe
 from flexclear.structure.fe.statics import Flexibility, support
 from flexclear.structure.kinds import kind
 from flexclear.structure.kinds.kind import of_mesh
-from flexclear.structure.modes import eigen, normal, reference
-from flexclear.structure.modes.condition import Condition, check
+from flexclear.structure.modes import normal, reference
+from flexclear.structure.modes.reference import Condition, check
 from flexclear.structure.modes.solution import solve
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import silent
@@ -38,7 +38,7 @@ WHOLE = [
 #: conditions that take more than a count; tests/analytic/test_modes_conditions.py
 WITH_MORE = {"constrained", "mean-axis"}
 #: more elements than the dense limit allows, so that the sparse solver is at work; nodes at 60 mm and 120 mm
-MANY = 4 * (eigen.DENSE_LIMIT // (4 * beam.N_DOFS) + 1)
+MANY = 4 * (normal.DENSE_LIMIT // (4 * beam.N_DOFS) + 1)
 
 
 def rod(elements: int = 12) -> xr.Dataset:
@@ -154,7 +154,7 @@ def test_every_process_gets_the_same_shapes() -> None:
 def test_sparse_and_dense_solver_agree(monkeypatch: pytest.MonkeyPatch, condition: str, count: int) -> None:
     fine = rod(MANY)
     sparse = solve(fine, condition, count)
-    monkeypatch.setattr(eigen, "DENSE_LIMIT", 10**6)
+    monkeypatch.setattr(normal, "DENSE_LIMIT", 10**6)
     dense = solve(fine, condition, count)
     # eps times the ratio of the largest to the lowest eigenvalue is 1e-6 as a bound; a hundredth of it is usual
     np.testing.assert_allclose(sparse["frequency"], dense["frequency"], rtol=1e-7)
@@ -180,17 +180,17 @@ def support_of(model: Model) -> Callable[[], Flexibility]:
 
 
 def gap(values: np.ndarray) -> tuple[int, float]:
-    found = eigen.gap(values)
+    found = normal.gap(values)
     assert found is not None
     return found
 
 
 def test_rigid_modes_are_separated_by_a_gap() -> None:
-    eigen.without_rigid(np.array([0.0, 1e-3, 1e-2, 9e7]), 3)
+    normal.without_rigid(np.array([0.0, 1e-3, 1e-2, 9e7]), 3)
     with pytest.raises(SolverError, match="expected below a gap"):
-        eigen.without_rigid(np.array([0.0, 1e-3, 1e6, 9e7]), 3)  # a mechanism or a missing rigid mode
+        normal.without_rigid(np.array([0.0, 1e-3, 1e6, 9e7]), 3)  # a mechanism or a missing rigid mode
     with pytest.raises(SolverError, match="expected below a gap"):
-        eigen.without_rigid(np.array([0.0, 1e-3, 1e-2, 1.1e-2, 9e7]), 3)
+        normal.without_rigid(np.array([0.0, 1e-3, 1e-2, 1.1e-2, 9e7]), 3)
 
 
 def test_a_body_a_million_times_softer_keeps_its_modes() -> None:

@@ -7,7 +7,8 @@ import pytest
 import xarray as xr
 
 from flexclear.artifacts import quantities
-from flexclear.post.cost import answer, work_precision
+from flexclear.post.cost import study as cost_study
+from flexclear.post.cost import work_precision
 from flexclear.post.cost.study import Point, assemble, is_resolved
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import SolverError
@@ -113,16 +114,16 @@ def test_a_reference_that_is_not_confirmed_is_drawn_as_one():
 def test_a_different_number_of_impacts_is_an_infinite_error_and_never_the_cheapest():
     found, *_ = study(d2=run(0.0, impacts=2, evaluations=1))
     assert np.isinf(found.error_by_tolerance.sel(rtol=1e-9, quantity="pin.impact_times")).all()
-    chosen = answer.cheapest(found, 1e-3)
+    chosen = cost_study.cheapest(found, 1e-3)
     assert chosen is not None
     assert chosen.evaluations > 1
 
 
 def test_the_cheapest_way_to_each_accuracy(found: xr.Dataset):
-    assert answer.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
-    assert answer.cheapest(found, 1e-4).name == "dop853, rtol 1e-06"
-    assert answer.cheapest(found, 1e-12) is None
-    rows = answer.price_list(found, "t").rows
+    assert cost_study.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
+    assert cost_study.cheapest(found, 1e-4).name == "dop853, rtol 1e-06"
+    assert cost_study.cheapest(found, 1e-12) is None
+    rows = cost_study.price_list(found, "t").rows
     assert rows[2][1] == "cannot be reached"
     # 1e-7 s of 0.6 s, and the 1e-8 s by which the reference and its confirmation differ
     assert "1.8e-07 at best" in rows[2][4]
@@ -130,12 +131,12 @@ def test_the_cheapest_way_to_each_accuracy(found: xr.Dataset):
 
 def test_an_error_below_the_references_uncertainty_is_not_claimed():
     found, *_ = study(uncertainty=1e-5)
-    assert answer.cheapest(found, 1e-6) is None
+    assert cost_study.cheapest(found, 1e-6) is None
 
 
 def test_a_study_of_which_every_run_is_refused_says_so():
     found, *_ = study(**dict.fromkeys(("other", "d0", "d1", "d2", "fine", "coarse"), REFUSED))
-    table = answer.price_list(found, "t")
+    table = cost_study.price_list(found, "t")
     assert all(row[1] == "cannot be reached" for row in table.rows)
     assert any("Not confirmed: other was refused" in note for note in table.notes)
 
@@ -151,9 +152,9 @@ def test_the_pareto_front_holds_what_nothing_beats():
 
 
 def test_the_least_time_decides_and_evaluations_only_where_times_are_alike(found: xr.Dataset):
-    assert answer.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
+    assert cost_study.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
     slow, *_ = study(fine=run(1e-4, evaluations=50, seconds=(0.3, 0.3, 0.3)))  # of dop853: 200 in 0.2 s
-    assert answer.cheapest(slow, 1e-3).name == "dop853, rtol 1e-06"
+    assert cost_study.cheapest(slow, 1e-3).name == "dop853, rtol 1e-06"
 
 
 def test_contacts_beyond_the_horizon_do_not_count():
@@ -174,7 +175,7 @@ def test_the_answer_has_the_time_and_the_error_up_to_the_horizon():
     found.attrs |= {"own_rtol": 1e-9, "own_integrator": "dop853", "own_seconds": 0.2, "own_evaluations": 2e3}
     found.attrs["flexible"] = 0
     found["own_error"] = (("quantity",), np.full(found.sizes["quantity"], 1e-6))
-    text = answer.sentences(found)
+    text = cost_study.sentences(found)
     assert "the integration takes 0.2 s of processor time (2000 evaluations)" in text
     assert "errs at the outputs up to the horizon, t = 0.5 s, by 1.0e-06 of" in text
 
@@ -186,10 +187,10 @@ def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size(found: 
     assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
     mark = work_precision.Mark("this scene", 0.5, {"slider.position": 1e-3})
     assert set(work_precision.make("w", found, "t", (mark,), [curve])) == {"w.png", "w.svg"}
-    assert answer.price_list(found, "t", ("said",)).notes[-1] == "said"
+    assert cost_study.price_list(found, "t", ("said",)).notes[-1] == "said"
 
 
 def test_runs_left_undone_are_named_with_their_reason():
     study = xr.Dataset(attrs={"undone": "rk4, step 1e-06 s"})
-    assert answer.skipped_sentence(study) == ["Not run within the budget: rk4, step 1e-06 s."]
-    assert answer.skipped_sentence(study.assign_attrs(undone="")) == []
+    assert study.skipped_sentence(study) == ["Not run within the budget: rk4, step 1e-06 s."]
+    assert study.skipped_sentence(study.assign_attrs(undone="")) == []

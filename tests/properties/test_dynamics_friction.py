@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from flexclear.dynamics.contact import friction
-from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
+from flexclear.dynamics.effects.declared import BALL, PIN, SLIDER
 from flexclear.dynamics.mechanics.bearings import pressure
 from flexclear.dynamics.vectors import ZERO, Matrix, Vector, Wrench
 from flexclear.numerics.rotations import rotation_vector_to_matrix

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from flexclear.dynamics import analyses
-from flexclear.post.render import film_speed, forms, gl, gltf, joint_view, player, surfaces, vibrations
+from flexclear.post.body_shape import AROUND, PER_CELL, surface
+from flexclear.post.render import film_speed, forms, gl, gltf, panel, player, surfaces, vibrations
 from flexclear.post.render.forms import Seat, equivalent_solid, wheels
 from flexclear.post.render.mechanism import Looks, Mechanism, drawn_points, mechanism
 from flexclear.post.render.pictures import MAKERS, Shown, make
 from flexclear.post.render.vibrations import Vibrations
-from flexclear.post.shapes.body_shape import AROUND, PER_CELL, surface
 from flexclear.scene.load import load_scene
 from flexclear.stages import rendering, simulation
 from flexclear.stages.scenes import require_names
@@ -263,7 +263,7 @@ def test_a_joint_is_shown_in_space_with_its_gap_and_force(shown: Shown):
     assert max(force) <= float(run["contact_normal_force"].max()) * 1.001
     assert f"{name}: path of the centre" in page
     clearance = json.loads(run.attrs["parameters"])["joint"][name]["clearance"]
-    room = joint_view.drawn_joint(run, 0).room
+    room = panel.drawn_joint(run, 0).room
     np.testing.assert_allclose(np.linalg.norm(room.points, axis=1), clearance, rtol=1e-12)
 
 

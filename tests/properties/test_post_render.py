@@ -9,6 +9,9 @@ import xarray as xr
 
 import flexclear as fc
 from flexclear.artifacts.paths import PROJECT
+from flexclear.post import body_shape
+from flexclear.post.body_shape import AROUND, PER_CELL, centre_line, scale_to
+from flexclear.post.body_shape import rod_surface as surface
 from flexclear.post.render import gl, gltf, player
 from flexclear.post.render.forms import equivalent_solid
 from flexclear.post.render.layout import part_pose
@@ -17,9 +20,6 @@ from flexclear.post.render.panel import panel
 from flexclear.post.render.pictures import Shown, make
 from flexclear.post.render.player import _camera
 from flexclear.post.render.view import ANGLE, eye
-from flexclear.post.shapes import body_shape
-from flexclear.post.shapes.body_shape import AROUND, PER_CELL, centre_line, scale_to
-from flexclear.post.shapes.body_shape import rod_surface as surface
 from flexclear.post.single_run.series import derive
 from flexclear.system.errors import SolverError
 from tests.paper import synthetic

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from pydantic import TypeAdapter, ValidationError
 
-from flexclear.artifacts import deficits
+from flexclear.artifacts import compliance
 from flexclear.dynamics.model.mechanism import build
 from flexclear.numerics.rotations import quaternion_to_matrix, rotation_between, rotation_vector_to_matrix
 from flexclear.scene import units
@@ -185,7 +185,7 @@ def lacking(reference: str, interfaces: str) -> str:
         coords={"frame": names, "frame_held": names, "direction": directions},
     )
     attributes = {"reference": reference, "interfaces": interfaces, "count": 12}
-    (reported,) = deficits.warnings(xr.Dataset({"compliance_share": fraction}, attrs=attributes), names, "rod")
+    (reported,) = compliance.warnings(xr.Dataset({"compliance_share": fraction}, attrs=attributes), names, "rod")
     return reported
 
 

@@ -14,7 +14,7 @@ from flexclear import dynamics
 from flexclear.artifacts import quantities
 from flexclear.artifacts.store import Store
 from flexclear.commands.new import KINDS, write
-from flexclear.post.cost.answer import sentences
+from flexclear.post.cost.study import sentences
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.artifacts.table import table
+from flexclear.artifacts.coordinates import as_table
 from flexclear.stages import export
 from flexclear.system.errors import InputError
 
@@ -26,7 +26,7 @@ def dataset() -> xr.Dataset:
 
 
 def test_a_table_has_a_column_for_each_component(dataset: xr.Dataset) -> None:
-    found = table(dataset)
+    found = as_table(dataset)
     assert list(found.columns[:3]) == ["position crank x [m]", "position crank y [m]", "position crank z [m]"]
     assert found.shape == (2, 7)
     assert found["position rod z [m]"].tolist() == [5.0, 11.0]
@@ -40,7 +40,7 @@ def test_a_sweep_has_a_row_for_each_point() -> None:
         {"v": (("c", "mu", "axis"), np.arange(12.0).reshape(2, 3, 2), {"units": "m/s"}), "grid": ("mu", [1, 2, 3])},
         {"c": c, "mu": [0.0, 0.1, 0.2], "axis": ["x", "y"]},
     )
-    found = table(data, ("c", "mu"))
+    found = as_table(data, ("c", "mu"))
     assert found.index.names == ["c [m]", "mu"]
     assert found.index.tolist()[:4] == [(1e-4, 0.0), (1e-4, 0.1), (1e-4, 0.2), (2e-4, 0.0)]
     assert found["v y [m/s]"].tolist() == [1.0, 3.0, 5.0, 7.0, 9.0, 11.0]

@@ -192,7 +192,7 @@ def test_a_source_of_a_recipe_that_is_no_text_is_refused(copy: Path, sources: So
 #: modules, and the first words of the tasks of a scene with clearance and flexible bodies that run again
 EDITED = {
     "pipeline/flexclear/dynamics/contact/friction/modified_coulomb.py": {"simulate", "ensemble"},
-    "pipeline/flexclear/structure/modes/reference/held.py": {"mesh", "modes", "bundle"},
+    "pipeline/flexclear/structure/modes/reference.py": {"mesh", "modes", "bundle"},
     "pipeline/flexclear/post/single_run/series.py": {"post"},
     "pipeline/flexclear/post/pages/page.css": {"post"},
     "pipeline/flexclear/stages/simulation.py": {"simulate", "ensemble"},

@@ -15,7 +15,7 @@ from flexclear.artifacts.paths import results_root
 from flexclear.commands import check, show
 from flexclear.commands.check import examine
 from flexclear.commands.new import KINDS, TEMPLATES, write
-from flexclear.scene import lines
+from flexclear.scene import toml_files
 from flexclear.scene.json_schema import scene_schema
 from flexclear.scene.plausibility import implausible_values
 from flexclear.scene.schema import Scene
@@ -174,7 +174,7 @@ def test_an_error_in_an_extended_scene_is_reported_in_its_file(tmp_path: Path, c
 
 def test_lines_are_those_of_the_text():
     text = '# a\n[body.rod] # b\ntype = "rigid"\nframes."a.b" = {}\ntext = """\n[joint.x]\n"""\n[[x]]\ny = 1\n'
-    found = lines.lines_of_keys(text)
+    found = toml_files.lines_of_keys(text)
     assert found["body", "rod"] == 2
     assert found["body", "rod", "type"] == 3
     assert found["body", "rod", "frames", "a.b"] == 4

@@ -16,10 +16,9 @@ from flexclear.commands.__main__ import main
 from flexclear.dynamics import analyses
 from flexclear.dynamics.run.evaluation import engine
 from flexclear.post.overview.sweep_figures import figures
-from flexclear.scene.design import design
 from flexclear.scene.load import load_scene
 from flexclear.scene.quantity import parse_recorded
-from flexclear.scene.sweep import read_sweep
+from flexclear.scene.sweep import design, read_sweep
 from flexclear.scene.units import udunits
 from flexclear.stages.sweeps import sweep_plan
 from flexclear.study import sweep

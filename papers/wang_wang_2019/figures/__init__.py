@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from papers.comparison import Figure
+
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure as Drawing
 
     from flexclear.applications import Progress
-    from flexclear.publishing import Table
 
 NAMES = {
     "fig01": "structure:mechanism",
@@ -43,32 +42,6 @@ NAMES = {
     "table10": "table10:costs",
     "table_verdicts": "table_verdicts:verdicts",
 }
-#: cell of a table without a value
-ABSENT = "–"
-#: artifacts by reference, such as ``sps4/csj:run``
-Data = dict[str, "xr.Dataset"]
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One figure or table.
-
-    title: subject.  needs: references of the artifacts that `make` requires, ``<scene>:<artifact>[/<body>]``.  make:
-    builds drawing or table from these artifacts; drawings share one style. files: that `make` opens, below the folder
-    of the sources.
-    """
-
-    title: str
-    needs: tuple[str, ...]
-    make: Callable[[Data], Drawing | Table]
-    files: tuple[str, ...] = ()
-
-
-def drawn(
-    title: str, *needs: str, files: tuple[str, ...] = ()
-) -> Callable[[Callable[[Data], Drawing | Table]], Figure]:
-    """Return a decorator that turns a drawing function into a `Figure`."""
-    return lambda make: Figure(title, needs, make, files)
 
 
 def figure(name: str) -> Figure:

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.publishing import Table
+from papers.comparison import ABSENT, Data, drawn
 from papers.wang_wang_2019 import models as paper
 from papers.wang_wang_2019.deviations import (
     Deviation,
@@ -15,7 +16,6 @@ from papers.wang_wang_2019.deviations import (
     max_deviation,
     velocity_at_events,
 )
-from papers.wang_wang_2019.figures import ABSENT, Data, drawn
 from papers.wang_wang_2019.published import TABLE7, TABLE8, TABLE9, MaximumError
 
 #: row heads, attribute of Deviation, factor to the unit, attribute of MaximumError (None: not in the paper)

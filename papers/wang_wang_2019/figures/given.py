@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.publishing import Table
+from papers.comparison import ABSENT, Data, Figure, drawn
 from papers.wang_wang_2019 import published
-from papers.wang_wang_2019.figures import ABSENT, Data, Figure, drawn
 from papers.wang_wang_2019.models import CSJ, IDEAL, JOINT, parameters
 from papers.wang_wang_2019.published import TABLE1, TABLE2, TABLE3, TABLE6
 

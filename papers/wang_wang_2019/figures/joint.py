@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from flexclear.publishing import style
-from papers.wang_wang_2019.figures import Data, drawn
+from papers.comparison import Data, drawn
 from papers.wang_wang_2019.figures.phase import at_times
 from papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, Model, comparable_until, parameters, references
 

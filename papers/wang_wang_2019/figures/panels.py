@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from flexclear.publishing import style
+from papers.comparison import Data, Figure, drawn, scale_differences
 from papers.wang_wang_2019 import models as paper
-from papers.wang_wang_2019.figures import Data, Figure, drawn
 from papers.wang_wang_2019.models import Quantity
 
 #: alpha of a curve inside its horizon, of a curve that the paper lacks, and beyond the horizon
@@ -20,10 +20,6 @@ FIRM, ADDED, PALE = 0.95, 0.4, 0.28
 #: number of time intervals for the envelope of a curve that the paper lacks: drawn as a curve, a ringing rod would
 #: cover the paper's own curves
 STRETCHES = 120
-#: largest ratio of the differences' sizes on a linear axis; above it the axis is logarithmic around zero
-SEPARATION = 20.0
-#: differences below this fraction of the largest are rounding
-ROUNDING = 1e-6
 
 
 QUANTITIES = (paper.ANGLE, paper.DISPLACEMENT, paper.VELOCITY, paper.ACCELERATION, paper.REACTION)
@@ -90,23 +86,7 @@ def difference(axes: Axes, quantity: Quantity, reference: paper.Motion, others: 
         _curve(axes, motion, time, values, 0.9)
         sizes.append(float(np.abs(values).max()))
     axes.set(xlim=(reference.time[0], reference.time[-1]), xlabel="time (s)", ylabel=f"minus ideal\n{quantity.unit}")
-    _scale(axes, sizes)
-
-
-def _scale(axes: Axes, sizes: Sequence[float]) -> None:
-    """Choose a scale on which differences of all sizes are visible."""
-    largest = max(sizes, default=0.0)
-    smallest = min((size for size in sizes if size > ROUNDING * largest), default=largest)
-    if largest <= SEPARATION * smallest:
-        axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
-        return
-    linear = 10.0 ** np.floor(np.log10(smallest))
-    axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
-    top = 10.0 ** np.ceil(np.log10(largest))
-    axes.set(ylim=(-top, top), yticks=[-top, 0.0, top])
-    axes.minorticks_off()
-    text = f"linear within ±{linear:g}, logarithmic beyond"
-    axes.text(0.995, 0.03, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
+    scale_differences(axes, sizes)
 
 
 def ball_deviation(axes: Axes, reference: paper.Motion, others: Sequence[paper.Motion], clearance: float = 0.0) -> None:

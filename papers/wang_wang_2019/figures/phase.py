@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from flexclear.publishing import style
-from papers.wang_wang_2019.figures import Data, Figure
+from papers.comparison import Data, Figure
 from papers.wang_wang_2019.models import (
     ACCELERATION,
     ANGLE,

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.text import Text
 
 from flexclear.publishing import View, rod_surface, scale_to, shell, style, triad, tube, view
-from papers.wang_wang_2019.figures import Data, Figure, drawn
+from papers.comparison import Data, Figure, drawn
 from papers.wang_wang_2019.models import CSJ, FAR_CB, FAR_CSJ_CB, IDEAL, JOINT, parameters
 from papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE5_NORMAL_MODE
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.publishing import Table
-from papers.wang_wang_2019.figures import ABSENT, Data, drawn
+from papers.comparison import ABSENT, Data, drawn
 from papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE6, TABLE10
 
 REFERENCE = "sps4/ideal"

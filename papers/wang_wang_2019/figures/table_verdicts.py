@@ -10,10 +10,10 @@ import numpy as np
 
 from flexclear.publishing import Table
 from papers import PROJECT, rows
+from papers.comparison import HOLDS, NOT, Data, Outcome, drawn, verdict, verdict_table
 from papers.wang_wang_2019 import deviations
 from papers.wang_wang_2019 import models as paper
 from papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference
-from papers.wang_wang_2019.figures import Data, drawn
 from papers.wang_wang_2019.figures.errors import NOISE
 from papers.wang_wang_2019.figures.table10 import evaluations
 from papers.wang_wang_2019.models import mode_set
@@ -27,8 +27,6 @@ SMALL = 0.05
 NEAR = 1.5
 #: fractions below this are rounding of the runs
 ROUNDING = 1e-9
-HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
-Outcome = tuple[str, str]  #: verdict, and the numbers behind it
 
 
 @drawn(
@@ -40,7 +38,6 @@ Outcome = tuple[str, str]  #: verdict, and the numbers behind it
 )
 def verdicts(data: Data) -> Table:
     """Tabulate each statement with the verdict of its test."""
-    judged = tuple((place, text, *TESTS[name](data)) for name, place, text in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
@@ -52,26 +49,21 @@ def verdicts(data: Data) -> Table:
         "repeated stroke, [geometry.md](geometry.md) what Table 8 says of the joint coordinates. Tables 4 "
         "and 5 have verdicts of their own below them.",
     )
-    heads = ("place", "statement", "verdict", "numbers")
-    return Table("Verdicts on the paper's statements (added)", heads, judged, notes)
-
-
-def _verdict(*tests: bool) -> str:
-    return HOLDS if all(tests) else (PARTLY if any(tests) else NOT)
+    return verdict_table("Verdicts on the paper's statements (added)", STATEMENTS, TESTS, data, notes)
 
 
 def _same_motion(data: Data) -> Outcome:
     own = deviations.sizes(data)
     fractions = [max(deviations.moved(data, model).over(own)) for model in paper.FAR]
     text = f"angle, displacement and velocity change by {100 * max(fractions):.1g} % of their largest values at most"
-    return _verdict(*(s < SMALL for s in fractions)), text
+    return verdict(*(s < SMALL for s in fractions)), text
 
 
 def _same_acceleration(data: Data) -> Outcome:
     largest = deviations.acceleration(data, paper.IDEAL)
     changes = {mode_set(m): difference(data, m, deviations.vertical).max() / largest for m in paper.FAR}
     text = _listed({name: fraction for name, fraction in changes.items() if fraction > ROUNDING}) or "nothing"
-    return _verdict(*(change < SMALL for change in changes.values())), f"it changes by {text} of the largest"
+    return verdict(*(change < SMALL for change in changes.values())), f"it changes by {text} of the largest"
 
 
 def _listed(fractions: Mapping[str, float]) -> str:
@@ -86,7 +78,7 @@ def _same_path(data: Data, models: Sequence[paper.Model]) -> Outcome:
     lengths = {m: f"{1e3 * far:.2g} mm" if 1e3 * far > NOISE else "nothing" for m, far in off.items()}
     words = ", ".join(f"{mode_set(model) or model.label} {length}" for model, length in lengths.items())
     numbers = f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
-    return _verdict(*(far < SMALL * stroke for far in off.values())), numbers
+    return verdict(*(far < SMALL * stroke for far in off.values())), numbers
 
 
 def _other_path(data: Data) -> Outcome:
@@ -99,14 +91,14 @@ def _slight_vibration(data: Data) -> Outcome:
     ideal = deviations.reaction(data, paper.IDEAL)
     reactions = {m: deviations.reaction(data, m) for m in paper.FAR}
     text = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in reactions.items())
-    return _verdict(*(force / ideal - 1.0 < SLIGHT for force in reactions.values())), f"ideal {ideal:.0f} N; {text}"
+    return verdict(*(force / ideal - 1.0 < SLIGHT for force in reactions.values())), f"ideal {ideal:.0f} N; {text}"
 
 
 def _consistent(data: Data) -> Outcome:
     free, fixed, full = (deviations.effects(data, model) for model in (paper.FAR_FREE, paper.FAR_FIXED, paper.FAR_CB))
     fractions = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
     missed = max(free["velocity"], fixed["velocity"]) < SLIGHT * full["velocity"]
-    return _verdict(*(fraction < SLIGHT for fraction in fractions.values())), (
+    return verdict(*(fraction < SLIGHT for fraction in fractions.values())), (
         f"they differ by {_listed(fractions)} of the effect that a basis with all static compliance finds"
         f"{'; of that on the velocity both miss nearly all' if missed else ''}"
     )
@@ -114,7 +106,7 @@ def _consistent(data: Data) -> Outcome:
 
 def _free_suitable(data: Data) -> Outcome:
     free, full = deviations.moved(data, paper.FAR_FREE).velocity, deviations.moved(data, paper.FAR_CB).velocity
-    return _verdict(abs(free / full - 1.0) < SLIGHT), (
+    return verdict(abs(free / full - 1.0) < SLIGHT), (
         f"free-free modes find {1e3 * free:.2g} mm/s of the {1e3 * full:.2g} mm/s that a basis with all static "
         "compliance finds"
     )
@@ -129,17 +121,17 @@ def _in_both_layouts(data: Data, outcome: Callable[[Data, paper.Model, paper.Mod
 def _no_influence(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
     angle, displacement, _ = deviations.moved(data, csj, ideal).over(deviations.sizes(data, ideal))
     text = f"angle {100 * angle:.1f} %, displacement {100 * displacement:.1f} %"
-    return _verdict(angle < SMALL, displacement < SMALL), text
+    return verdict(angle < SMALL, displacement < SMALL), text
 
 
 def _velocity_free(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
     *_, fraction = deviations.moved(data, csj, ideal).over(deviations.sizes(data, ideal))
-    return _verdict(fraction < SMALL), f"{100 * fraction:.1f} % of the largest velocity"
+    return verdict(fraction < SMALL), f"{100 * fraction:.1f} % of the largest velocity"
 
 
 def _conspicuous(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
     (force, acceleration), (base, base_acceleration) = (deviations.peaks(data, model) for model in (csj, ideal))
-    return _verdict(force > 2.0 * base, acceleration > 2.0 * base_acceleration), (
+    return verdict(force > 2.0 * base, acceleration > 2.0 * base_acceleration), (
         f"force {base:.0f} to {force:.0f} N, acceleration {base_acceleration:.0f} to {acceleration:.0f} m/s²"
     )
 
@@ -149,7 +141,7 @@ def _lowered(data: Data) -> Outcome:
     rigid = deviations.peaks(data, paper.CSJ)
     text = "; ".join(f"{mode_set(m)} {force:.0f} N, {a:.0f} m/s²" for m, (force, a) in peaks.items())
     tests = [force < rigid[0] and a < rigid[1] for force, a in peaks.values()]
-    return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {text}"
+    return verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {text}"
 
 
 def _motion_kept(data: Data) -> Outcome:
@@ -157,7 +149,7 @@ def _motion_kept(data: Data) -> Outcome:
     moved, own = {model: deviations.moved(data, model) for model in paper.FAR_CSJ}, deviations.sizes(data)
     largest = np.max([one.over(own) for one in moved.values()], axis=0)
     sets = [abs(ratio - 1.0) for ratio in moved[paper.FAR_CSJ_FREE].over(moved[paper.FAR_CSJ_FIXED])]
-    return _verdict(*(s < SMALL for s in largest), *(s < SLIGHT for s in sets)), (
+    return verdict(*(s < SMALL for s in largest), *(s < SLIGHT for s in sets)), (
         f"angle {100 * largest[0]:.1f} %, displacement {100 * largest[1]:.1f} %, velocity {100 * largest[2]:.1f} % off "
         f"the ideal model; between free-free and fixed-fixed modes these differ by {100 * max(sets):.2g} % at most"
     )
@@ -175,7 +167,7 @@ def _paths_differ(data: Data) -> Outcome:
         f"{factor * fixed[n].mean():.0f} ± {factor * fixed[n].std(ddof=1):.0f} {words}"
         for n, (words, factor) in names.items()
     ]
-    return _verdict(*tests), f"free-free and fixed-fixed: {'; '.join(texts)}"
+    return verdict(*tests), f"free-free and fixed-fixed: {'; '.join(texts)}"
 
 
 def _dashpot(data: Data) -> Outcome:
@@ -189,7 +181,7 @@ def _dashpot(data: Data) -> Outcome:
     count = {m: float(data[f"{m.scene}:ensemble"].impact_count.sel(contact=paper.JOINT).mean()) for m in paper.FAR_CSJ}
     text = "; ".join(f"{mode_set(m)} {rows[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in paper.FAR_CSJ)
     impacts = int(data[f"{paper.CSJ.scene}:post"].impact_count.sel(contact=paper.JOINT))
-    return _verdict(*(size < rigid for size in rows.values())), (
+    return verdict(*(size < rigid for size in rows.values())), (
         f"vibration CSJ {rigid:.0f} m/s² and {impacts} impacts; "
         f"{text}; without structural damping the rod takes no energy out of the mechanism"
     )
@@ -199,13 +191,13 @@ def _sets_differ(data: Data) -> Outcome:
     free, fixed = (deviations.peaks(data, model) for model in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED))
     force, acceleration = (abs(a / b - 1.0) for a, b in zip(free, fixed, strict=True))
     text = f"by {100 * force:.0f} % in force, {100 * acceleration:.0f} % in acceleration"
-    return _verdict(force > SLIGHT, acceleration > SLIGHT), text
+    return verdict(force > SLIGHT, acceleration > SLIGHT), text
 
 
 def _fixed_right(data: Data) -> Outcome:
     *peaks, best = (deviations.peaks(data, model) for model in paper.FAR_CSJ)
     free, fixed = ([own / of - 1.0 for own, of in zip(one, best, strict=True)] for one in peaks)
-    return _verdict(*(abs(b) < abs(a) for a, b in zip(free, fixed, strict=True))), (
+    return verdict(*(abs(b) < abs(a) for a, b in zip(free, fixed, strict=True))), (
         f"against all static compliance: free-free {100 * free[0]:+.0f} % (force), {100 * free[1]:+.0f} % "
         f"(acceleration); fixed-fixed {100 * fixed[0]:+.0f} %, {100 * fixed[1]:+.0f} %"
     )
@@ -213,7 +205,7 @@ def _fixed_right(data: Data) -> Outcome:
 
 def _clearance_dominates(data: Data) -> Outcome:
     parts = deviations.moved(data, paper.FAR_CB).over(deviations.moved(data, paper.CSJ))
-    return _verdict(*(s < SLIGHT for s in parts)), (
+    return verdict(*(s < SLIGHT for s in parts)), (
         f"the rod's part of the clearance's: angle {100 * parts[0]:.2g} %, displacement {100 * parts[1]:.2g} %, "
         f"velocity {100 * parts[2]:.2g} %"
     )
@@ -223,7 +215,7 @@ def _enlarged(data: Data) -> Outcome:
     rigid = deviations.moved(data, paper.CSJ)
     rises = {m: [ratio - 1.0 for ratio in deviations.moved(data, m).over(rigid)] for m in paper.FAR_CSJ}
     texts = [f"{mode_set(m)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise) for m, rise in rises.items()]
-    return _verdict(*(min(rise) > 0.0 for rise in rises.values())), f"angle, displacement, velocity: {'; '.join(texts)}"
+    return verdict(*(min(rise) > 0.0 for rise in rises.values())), f"angle, displacement, velocity: {'; '.join(texts)}"
 
 
 def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
@@ -235,7 +227,7 @@ def _costs(data: Data, models: Sequence[paper.Model]) -> Outcome:
         texts_by_model = {m: f"{ratio:.3g}" if np.isfinite(ratio) else "fails" for m, ratio in costs.items()}
         words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {text}" for m, text in texts_by_model.items()))
     printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
-    return _verdict(*tests), f"printed times {printed}; evaluations at {'; at '.join(words)}"
+    return verdict(*tests), f"printed times {printed}; evaluations at {'; at '.join(words)}"
 
 
 def _becomes_chaotic(data: Data) -> Outcome:
@@ -246,7 +238,7 @@ def _becomes_chaotic(data: Data) -> Outcome:
         rows = {row["scene"]: row for row in csv.DictReader(file)}
     requested = {paper.CSJ: "quasi-periodic", **dict.fromkeys(paper.FAR_CSJ, "chaotic")}
     texts = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in requested]
-    return _verdict(*(rows[model.scene]["verdict"] == motion for model, motion in requested.items())), (
+    return verdict(*(rows[model.scene]["verdict"] == motion for model, motion in requested.items())), (
         f"over {rows[paper.CSJ.scene]['periods']} repeated strokes: {'; '.join(texts)} (chaos.md)"
     )
 

@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.artifacts.schema import AXES, CONVENTIONS, QUATERNION
-from flexclear.scene.design import Design
 from flexclear.scene.quantity import Recorded
+from flexclear.scene.sweep import Design
 from flexclear.scene.units import udunits
 
 Values = dict[str, np.ndarray]

@@ -15,7 +15,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.scene import lines
+from flexclear.scene import toml_files
 from flexclear.scene.limits import Limits
 from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of_file
 from flexclear.scene.references import dangling_names
@@ -84,9 +84,9 @@ def command(options: argparse.Namespace) -> int:
         print(json.dumps(Findings([*errors.values()], [*warnings.values()]).records(), indent=2))
     else:
         for warning in warnings.values():
-            print(f"flexclear: warning: {lines.with_line_number(warning)}", file=sys.stderr)
+            print(f"flexclear: warning: {toml_files.with_line_number(warning)}", file=sys.stderr)
         for mistake in errors.values():
-            text = lines.with_line_number(mistake) if isinstance(mistake, InputError) else mistake
+            text = toml_files.with_line_number(mistake) if isinstance(mistake, InputError) else mistake
             print(f"flexclear: {text}", file=sys.stderr)
         if len(errors) > 1:
             print(f"flexclear: {len(errors)} errors", file=sys.stderr)
@@ -207,7 +207,7 @@ def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
     record = {"severity": severity, "file": None, "line": None, "place": "", "problem": str(mistake), "remedy": None}
     if not isinstance(mistake, InputError):
         return record
-    location = lines.where(mistake)
+    location = toml_files.where(mistake)
     file, line = (str(location[0]), location[1]) if location else (None, None)
     place = {"file": file, "line": line, "place": mistake.place}
     return {**record, **place, "problem": mistake.problem, "remedy": mistake.remedy}
@@ -345,7 +345,7 @@ def _check_assembly(whole: Scene, bodies: Mapping[str, Body], findings: Findings
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):
-        findings.warnings.append(lines.with_file_name(InputError(place, text, remedy), whole.path))
+        findings.warnings.append(toml_files.with_file_name(InputError(place, text, remedy), whole.path))
     unused = unused_frames(mechanism)
     if unused:
         more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
@@ -408,7 +408,7 @@ def _starts_ideal(whole: Scene) -> bool:
 def _note_choice(whole: Scene, mechanism: Mechanism, findings: Findings) -> None:
     """Warn of a start that the scene does not choose; frames moved within their tolerance are no choice."""
     if "[start.joint." in mechanism.choice:
-        findings.warnings.append(lines.with_file_name(InputError("[start]", mechanism.choice), whole.path))
+        findings.warnings.append(toml_files.with_file_name(InputError("[start]", mechanism.choice), whole.path))
 
 
 def _fill_in_recipes(whole: Scene, bodies: Mapping[str, Body]) -> Scene:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from flexclear.scene import lines
+from flexclear.scene import toml_files
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
 from flexclear.stages.show import show_start
@@ -48,7 +48,7 @@ def command(options: argparse.Namespace) -> int:
         files, refused = show_start(scene, quiet=options.quiet or options.json)
         made[scene.name] = [str(file) for file in files]
         if refused is not None:
-            print(f"flexclear: {lines.with_line_number(refused)}", file=sys.stderr)
+            print(f"flexclear: {toml_files.with_line_number(refused)}", file=sys.stderr)
             result = refused.exit_code
     if options.json:
         print(as_json(made))

@@ -1,7 +1,8 @@
-"""Provenance of values: the texts in `source` of scenes and recipes, by key path; and tables without them."""
+"""Sources: of values, from `source` in scenes and recipes, by key path; of methods, from docstrings (``Source:``)."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -55,3 +56,15 @@ def without_sources(node: Any) -> Any:
     # most lists contain only numbers
     nested = isinstance(node, list) and any(isinstance(item, (dict, list)) for item in node)
     return [without_sources(item) for item in node] if nested else node
+
+
+_SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)
+
+
+def cited_sources(docstring: str | None) -> list[str]:
+    r"""Return the sources that a docstring names, each on one line.
+
+    >>> cited_sources("A law.\n\nSource: Hertz (1881), Journal f. Math.\n92, 156-171.")
+    ['Hertz (1881), Journal f. Math. 92, 156-171.']
+    """
+    return [" ".join(match[1].split()) for match in _SOURCE.finditer(docstring or "")]

@@ -99,7 +99,8 @@ def _kinds() -> dict[str, Kind]:
 KINDS = _kinds() | {EXPRESSION: Kind("", "", ("", ""), "", "")}
 
 
-def _words() -> dict[str, list[str]]:
+def _kinds_by_word() -> dict[str, list[str]]:
+    """Return the kinds that each word may mean: their keys, variables and synonyms."""
     words: dict[str, list[str]] = {}
     for key, kind in KINDS.items():
         front = next((front for front in _FRONTS if kind.variable.startswith(front)), "")
@@ -110,7 +111,7 @@ def _words() -> dict[str, list[str]]:
 
 
 #: word -> the kinds that it may mean
-WORDS = _words()
+WORDS = _kinds_by_word()
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,17 @@ from typing import Any
 
 import xarray as xr
 
-from flexclear.post.cost import answer, work_precision
-from flexclear.post.cost.study import Point, assemble, comparable_until, cost, relative_errors, with_reference
+from flexclear.post.cost import work_precision
+from flexclear.post.cost.study import (
+    Point,
+    assemble,
+    comparable_until,
+    cost,
+    price_list,
+    relative_errors,
+    skipped_sentence,
+    with_reference,
+)
 from flexclear.post.cost.work_precision import Mark
 from flexclear.post.plotting.table import files
 from flexclear.scene.quantity import Quantity
@@ -33,9 +42,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
     title = params["title"]
     notes = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
-    notes += (*answer.skipped_sentence(study),)
+    notes += (*skipped_sentence(study),)
     reference = runs[next(p.key for p in points if p.group == "reference")]
     errors = relative_errors(asis, reference, chosen, comparable_until(points, runs))
     mark, others = Mark("this scene", cost(asis, "cpu_seconds"), errors), work_precision.peers(study, params["peers"])
     figure = work_precision.make("work_precision", study, f"Error against cost: {title}", (mark,), others)
-    return {"nc": study} | files("price", answer.price_list(study, f"What accuracy costs: {title}", notes)) | figure
+    return {"nc": study} | files("price", price_list(study, f"What accuracy costs: {title}", notes)) | figure

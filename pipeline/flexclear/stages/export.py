@@ -35,12 +35,12 @@ def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",
     if target.suffix == ".nc":
         write_dataset(target, dataset)
         return
-    from flexclear.artifacts.table import table
+    from flexclear.artifacts.coordinates import as_table
 
     made: dict[str, Callable[[], bytes]] = {
-        ".csv": lambda: table(dataset, rows).to_csv().encode(),
-        ".parquet": lambda: _file_bytes(table(dataset, rows).to_parquet),
-        ".xlsx": lambda: _file_bytes(table(dataset, rows).to_excel),
+        ".csv": lambda: as_table(dataset, rows).to_csv().encode(),
+        ".parquet": lambda: _file_bytes(as_table(dataset, rows).to_parquet),
+        ".xlsx": lambda: _file_bytes(as_table(dataset, rows).to_excel),
         ".mat": lambda: _matlab(dataset),
         ".npz": lambda: _numpy(dataset),
     }

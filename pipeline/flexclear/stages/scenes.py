@@ -21,7 +21,7 @@ from flexclear.artifacts.paths import DATA, results_root
 from flexclear.artifacts.store import PARTIAL, Store
 from flexclear.post.pages import media
 from flexclear.post.plotting.table import as_html, from_markdown
-from flexclear.scene import lines
+from flexclear.scene import toml_files
 from flexclear.scene.load import is_file, load_scene, scene_name, table_with_changes
 from flexclear.scene.plausibility import implausible_values
 from flexclear.scene.quantity import KINDS, parse
@@ -106,12 +106,11 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     """
     examine(scene)
     workplace = workplace or open_workplace()
-    from flexclear.artifacts import modal as modal  # gives the dataset its accessor
 
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: a worker would run a caller's script again from its top
     (made,) = workplace.datasets(task, jobs=1)
-    from flexclear.artifacts.table import with_dataframe
+    from flexclear.artifacts.coordinates import with_dataframe
 
     return with_dataframe(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)), scene, run_head)
 
@@ -122,8 +121,6 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     InputError without results, or for a file with other contents.
     """
     import xarray as xr
-
-    from flexclear.artifacts import modal as modal
 
     if str(scene).endswith(".nc"):
         path = Path(str(scene))
@@ -181,7 +178,7 @@ def bundles(scene: Scene, workplace: Workplace | None = None) -> dict[str, xr.Da
 
 def deficits(graph: Graph, workplace: Workplace) -> str:
     """Return a table for each flexible body of what its bundle lacks."""
-    from flexclear.artifacts.deficits import table
+    from flexclear.artifacts.compliance import table
 
     reduced = dict(zip(graph.bundle, workplace.datasets(*graph.bundle.values()), strict=True))
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
@@ -300,7 +297,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
             by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
         except InputError as error:
             wrong += errors_of(error)
-    refuse([lines.with_line_number(error) for error in wrong])
+    refuse([toml_files.with_line_number(error) for error in wrong])
     _refuse_namesakes([graph.scene for graph in by_scene.values()])
     return list(by_scene.values())
 
@@ -311,7 +308,7 @@ def errors_in_file(path: Path | None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise lines.with_file_name(error, path) from None
+        raise toml_files.with_file_name(error, path) from None
 
 
 def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
@@ -329,7 +326,7 @@ def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
     """Print plausibility warnings; raise InputErrors for dangling names. Both come before any computation."""
     require_names(scene)
     for warning in implausibilities(scene, settings):
-        print(f"flexclear: {WARNING}{lines.with_line_number(warning)}", file=sys.stderr)
+        print(f"flexclear: {WARNING}{toml_files.with_line_number(warning)}", file=sys.stderr)
 
 
 def require_names(scene: Scene) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.post.pages import small_picture, viewer, viewer_page
 from flexclear.post.render import gl
-from flexclear.scene import lines, notebook
+from flexclear.scene import notebook, toml_files
 from flexclear.stages import meshing, rendering, scenes, simulation
 from flexclear.stages.workplace import relative
 from flexclear.system.errors import FlexclearError, InputError, ResourceError
@@ -34,7 +34,7 @@ def show_start(
         print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
     for gap in view.gaps:
         print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.words}", file=sys.stderr)
-    return files, None if refused is None else lines.with_file_name(refused, scene.path)
+    return files, None if refused is None else toml_files.with_file_name(refused, scene.path)
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def start(scene: Scene, folder: Path | None = None) -> Start:
 
 def motion(run: xr.Dataset, folder: Path | None = None) -> Page:
     """Return the page of a run; write it where a folder is given.  Raises InputError for bodies that are not known."""
-    from flexclear.artifacts.table import scene_of
+    from flexclear.artifacts.coordinates import scene_of
     from flexclear.post.single_run.series import parameters
 
     scene, bodies = scene_of(run), parameters(run).get("body")

@@ -117,7 +117,7 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[st
     """Return warnings on flexible bodies whose modes lack static compliance between frames of joints and loads."""
     if not reduced:
         return []
-    from flexclear.artifacts import deficits
+    from flexclear.artifacts import compliance
 
     messages, loads = [], scene.load.values()
     named = [end for part in (*scene.joint.values(), *loads) for end in getattr(part, "between", ())]
@@ -125,7 +125,7 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[st
     for body, bundle in reduced.items():
         used = [frame for owner, _, frame in (end.partition(".") for end in named) if owner == body]
         if used and "compliance_share" in bundle:
-            messages += deficits.warnings(bundle, used, body)
+            messages += compliance.warnings(bundle, used, body)
     return messages
 
 

@@ -47,7 +47,7 @@ class ShownAnswer:
 def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     """Return heading, text, picture and table of the answer called accuracy, stability or effects."""
     from flexclear.post.answers import effect_ranking
-    from flexclear.post.cost.answer import sentences
+    from flexclear.post.cost.study import sentences
 
     data = answer.dataset()
     if name == "accuracy":

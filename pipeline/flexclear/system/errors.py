@@ -40,10 +40,10 @@ class FlexclearError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how to restore the error without `__init__`, whose arguments are not stored."""
-        return _as_it_was, (type(self), self.args), self.__dict__
+        return _of_kind_and_text, (type(self), self.args), self.__dict__
 
 
-def _as_it_was(kind: type[FlexclearError], args: tuple[str, ...]) -> FlexclearError:
+def _of_kind_and_text(kind: type[FlexclearError], args: tuple[str, ...]) -> FlexclearError:
     return kind.__new__(kind, *args)
 
 
@@ -136,7 +136,7 @@ class StoppedError(FlexclearError):
 def error_of(exit_code: int, place: str, text: str) -> FlexclearError:
     """Return an error of the class with this exit code from a message that is complete already."""
     kind = {one.exit_code: one for one in (InputError, SolverError, ResourceError)}.get(exit_code, FlexclearError)
-    error = _as_it_was(kind, (text,))
+    error = _of_kind_and_text(kind, (text,))
     if isinstance(error, InputError):
         error.place, error.problem, error.remedy = place, text, None
     return error

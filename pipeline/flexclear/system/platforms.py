@@ -76,7 +76,7 @@ def share_blocks(source: Any, target: Any) -> bool:
 def replace(scratch: Path, path: Path) -> None:
     """Rename a file to `path` and replace the file there, also if it is read-only or briefly open on Windows."""
     set_aside(path)
-    _insist(lambda: os.replace(scratch, path), path)
+    _retry(lambda: os.replace(scratch, path), path)
 
 
 def set_aside(path: Path) -> None:
@@ -92,10 +92,10 @@ def set_aside(path: Path) -> None:
 def remove(path: Path) -> None:
     """Remove a file if it exists, also if it is read-only or briefly open on Windows."""
     with contextlib.suppress(FileNotFoundError):
-        _insist(lambda: os.unlink(path), path)
+        _retry(lambda: os.unlink(path), path)
 
 
-def _insist(change: Callable[[], None], path: Path) -> None:
+def _retry(change: Callable[[], None], path: Path) -> None:
     """Repeat a change that removes a file: a program with the file open (viewer, virus scanner) may close it soon."""
     end = time.monotonic() + WAIT_FOR_FILE
     while True:

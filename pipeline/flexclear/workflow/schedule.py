@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.artifacts.store import MAIN, Record, Store
-from flexclear.scene import lines
+from flexclear.scene import toml_files
 from flexclear.system.errors import (
     INTERRUPTED,
     FlexclearError,
@@ -329,7 +329,7 @@ def _failure(task: Task, error: FlexclearError) -> Failure:
     """Return the failure of a task by an expected error; input errors are located in their file, if any."""
     if isinstance(error, InputError):
         path = task.context.get(PATH)
-        error = lines.with_line_number(lines.with_file_name(error, Path(path) if path else None))
+        error = toml_files.with_line_number(toml_files.with_file_name(error, Path(path) if path else None))
         if path and all(str(path) in one.place for one in errors_of(error)):
             return Failure(task, error.exit_code, str(error))
     return Failure(task, error.exit_code, f"{task.scene} {task.label}: {error}")

@@ -1,7 +1,7 @@
 """Laws of time, for drives and loads. To add one: a module here, a line in the table, and its parameters in
 scene/laws.
 
-Each module has ``pieces(law, dimension) -> Pieces`` (see `pieces`), which raises ValueError, in words, for values of
+Each law has a function ``(law, dimension) -> Pieces`` (see `pieces`), which raises ValueError, in words, for values of
 another dimension.
 """
 
@@ -10,31 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.dynamics.drives import (
-    constant,
-    delayed,
-    expression,
-    harmonic,
-    piecewise,
-    polynomial,
-    repeated,
-    spline,
-    step,
-    sum,
-    table,
-)
+from flexclear.dynamics.drives import composed, expression, polynomial, spline, step
 from flexclear.dynamics.drives.pieces import Pieces
 
 LAWS: dict[str, Callable[[Any, str], Pieces]] = {
-    "constant": constant.pieces,
+    "constant": polynomial.pieces_of_constant,
     "step": step.pieces,
-    "polynomial": polynomial.pieces,
-    "harmonic": harmonic.pieces,
-    "spline": spline.pieces,
-    "table": table.pieces,
-    "sum": sum.pieces,
-    "piecewise": piecewise.pieces,
-    "repeated": repeated.pieces,
-    "delayed": delayed.pieces,
+    "polynomial": polynomial.pieces_of_polynomial,
+    "harmonic": polynomial.pieces_of_harmonic,
+    "spline": spline.pieces_of_spline,
+    "table": spline.pieces_of_table,
+    "sum": composed.pieces_of_sum,
+    "piecewise": composed.pieces_of_piecewise,
+    "repeated": composed.pieces_of_repeated,
+    "delayed": composed.pieces_of_delayed,
     "expression": expression.pieces,
 }

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from flexclear.dynamics.drives.pieces import Pieces, polynomials
-from flexclear.scene.laws import Ends, Spline
+from flexclear.scene.laws import Ends, Spline, Table
 from flexclear.scene.units import quantity
 
 
-def pieces(law: Spline, dimension: str) -> Pieces:
+def pieces_of_spline(law: Spline, dimension: str) -> Pieces:
     """Return one piece between each two points."""
     return through(law.time, tuple(quantity(v, dimension) for v in law.value), law.degree, law.ends)
 
@@ -44,3 +44,11 @@ def _ends(ends: Ends) -> Any:
     if ends in both:
         return both[ends], both[ends]
     return "periodic" if ends == "periodic" else None
+
+
+def pieces_of_table(law: Table, dimension: str) -> Pieces:
+    """Return one piece between each two rows."""
+    # "1" is the unit of bare numbers; a column that states its unit has another one
+    factor = 1.0 if law.value.unit == "1" else quantity(f"1 {law.value.unit}", dimension)
+    time, value = zip(*law.points, strict=True)
+    return through(time, tuple(factor * v for v in value), law.degree, law.ends)

@@ -10,8 +10,8 @@ from pathlib import Path
 from flexclear.artifacts.paths import PACKAGE
 from flexclear.dynamics.effects import most_parts, schemes
 from flexclear.dynamics.effects.declared import EFFECTS
-from flexclear.scene.citations import cited_sources
 from flexclear.scene.integrators import INTEGRATORS
+from flexclear.scene.provenance import cited_sources
 from flexclear.scene.schema import Scene
 from flexclear.workflow.task import flatten
 

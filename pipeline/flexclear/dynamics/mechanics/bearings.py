@@ -23,7 +23,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from flexclear.dynamics.contact.surfaces.separation import across
-from flexclear.dynamics.effects.joint_friction import BALL, PIN, SLIDER
+from flexclear.dynamics.effects.declared import BALL, PIN, SLIDER
 from flexclear.dynamics.mechanics.contacts import rub
 from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.effects.joint_friction import BEARINGS, SLIDER
+from flexclear.dynamics.effects.declared import BEARINGS, SLIDER
 from flexclear.dynamics.model.components import Floors, Group
 from flexclear.dynamics.model.contacts import bristle, friction_law
 from flexclear.dynamics.model.filling import Filling

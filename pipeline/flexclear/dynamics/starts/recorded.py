@@ -1,4 +1,4 @@
-"""Start of a run as another run has recorded it (`scene.recorded_start`)."""
+"""Start of a run as another run has recorded it (`scene.start`)."""
 
 from __future__ import annotations
 

@@ -11,13 +11,13 @@ import pyvista as pv
 import xarray as xr
 from vtkmodules.vtkCommonCore import vtkLogger
 
+from flexclear.post.body_shape import faces, has_edges
 from flexclear.post.overview.curves import in_unit
 from flexclear.post.plotting import style
 from flexclear.post.render import film_speed, layout, mechanism, ruler
 from flexclear.post.render.panel import panel
 from flexclear.post.render.surfaces import Surface
 from flexclear.post.render.view import ANGLE, eye
-from flexclear.post.shapes.body_shape import faces, has_edges
 from flexclear.scene.quantity import Quantity
 from flexclear.system.progress import Progress, silent
 

@@ -15,10 +15,10 @@ import numpy as np
 import xarray as xr
 
 from flexclear.numerics.rotations import matrix_to_quaternion
+from flexclear.post.body_shape import fields_of, hertz, linear_fields
 from flexclear.post.render.layout import part_pose, pose
 from flexclear.post.render.mechanism import COLORS, Flexible, Mechanism, rest, skin
 from flexclear.post.render.surfaces import Surface
-from flexclear.post.shapes.body_shape import fields_of, hertz, linear_fields
 
 FLOAT, WHOLE, ARRAY, INDICES = 5126, 5125, 34962, 34963
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}

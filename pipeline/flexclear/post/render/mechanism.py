@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from flexclear.post import body_shape
+from flexclear.post.body_shape import faces, scale_to, surface
 from flexclear.post.render import forms, surfaces
 from flexclear.post.render.forms import Seat, Solid, Wheel, equivalent_solid, wheels
 from flexclear.post.render.layout import (
@@ -21,17 +23,15 @@ from flexclear.post.render.layout import (
     Layout,
     Part,
     centre_at_rest,
+    loads,
     names,
     part_pose,
     pose,
     samples,
     travel_range,
 )
-from flexclear.post.render.load_parts import loads
 from flexclear.post.render.surfaces import Surface
 from flexclear.post.render.view import View, view
-from flexclear.post.shapes import body_shape
-from flexclear.post.shapes.body_shape import faces, scale_to, surface
 from flexclear.post.single_run.series import parameters
 from flexclear.scene.loose_joints import SURFACES
 from flexclear.system.errors import InputError

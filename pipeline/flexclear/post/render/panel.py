@@ -16,8 +16,11 @@ from flexclear.post.overview.curves import Curve, by_unit, turned_by
 from flexclear.post.overview.curves import curves as watched_curves
 from flexclear.post.overview.figures import centre, orbit
 from flexclear.post.plotting import style
-from flexclear.post.render import film_speed, joint_view
-from flexclear.post.single_run.series import derive
+from flexclear.post.render import film_speed, surfaces
+from flexclear.post.render.surfaces import Surface
+from flexclear.post.render.view import View
+from flexclear.post.single_run.series import derive, parameters
+from flexclear.scene.loose_joints import SURFACES
 from flexclear.scene.quantity import Quantity
 
 #: largest angle of a body that does not turn [degrees]
@@ -76,7 +79,7 @@ def panel(
     watch: names of bodies, joints and contacts, of which the first of each is shown; else the body that moves farthest,
     the first contact, the first joint.  curves: quantities; the first two that the run has replace motion and reaction.
     """
-    loose = [str(run["contact"].values[k]) for k in joint_view.with_clearance(run)]
+    loose = [str(run["contact"].values[k]) for k in with_clearance(run)]
     contact = bool(loose)
     canvas = style.canvas(size, layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.1))
     figure = canvas.figure
@@ -205,3 +208,57 @@ def _dot(axes: style.Axes, size: float) -> Any:
     """Return the mark that moves along a curve."""
     (dot,) = axes.plot([], [], "o", color=style.INK, ms=size, animated=True)
     return dot
+
+
+#: colour of a path, as in the plots of orbits; largest number of its drawn points
+PATH_COLOR, PLACES = "#009E73", 1500
+#: radius of the mark at the centre and of the path, as fractions of the region's size
+MARK, PATH = 0.05, 0.006
+#: directions of view of a sphere and of a flat region
+SLANTED, ABOVE = np.array([0.5, -1.0, 0.7]), np.array([0.0, -0.45, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class JointView:
+    """Surfaces in axes of the socket [m]; `mark` about the centre of the ball or pin."""
+
+    room: Surface
+    path: Surface
+    mark: Surface
+    view: View
+
+
+def with_clearance(run: xr.Dataset) -> list[int]:
+    """Return columns of the contacts that are joints with clearance; ends of stops have no path."""
+    joints = parameters(run).get("joint", {})
+    return [k for k, name in enumerate(run["contact"].values) if str(name) in joints] if "contact" in run.sizes else []
+
+
+def drawn_joint(run: xr.Dataset, contact: int) -> JointView:
+    """Return the drawn surfaces of one joint with clearance."""
+    offset = run["contact_offset"].values[:, contact]
+    room, half = _room(parameters(run)["joint"][str(run["contact"].values[contact])], offset)
+    some = np.unique(np.linspace(0, len(offset) - 1, PLACES).astype(int))
+    flat = np.ptp(room.points[:, 2]) < 0.1 * half
+    view = View(ABOVE if flat else SLANTED, np.eye(3)[1 if flat else 2], False)
+    return JointView(room, surfaces.tube(offset[some], PATH * half), surfaces.sphere(MARK * half), view)
+
+
+def _room(given: dict, offset: np.ndarray) -> tuple[Surface, float]:
+    """Return the region of the centre without contact, and a length for the size of marks [m].
+
+    A sphere or disc of the clearance, a slot longer by its travel; for a ball on a plane the plane of the centre at
+    contact.
+    """
+    kind = SURFACES[given["type"]]
+    if not kind.hollow:
+        low, high = offset.min(axis=0), offset.max(axis=0)
+        reach = max(float((high - low).max()), 2.0 * float(given["ball_radius"]))
+        plane = surfaces.box((*((high - low)[:2] + 0.4 * reach), 0.005 * reach))
+        return surfaces.place(plane, np.array([*(0.5 * (low + high))[:2], given["ball_radius"]])), 0.6 * reach
+    clearance = float(given["clearance"])
+    if kind.ideal == "spherical":
+        return surfaces.sphere(clearance), clearance
+    half = 0.5 * float(given.get("travel", 0.0))
+    outline = surfaces.hull(np.array([[-half, 0.0], [half, 0.0]]), clearance)
+    return surfaces.prism(outline, 0.02 * clearance), max(clearance, 0.3 * half)

@@ -14,11 +14,11 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import xarray as xr
 
+from flexclear.post.body_shape import surface
 from flexclear.post.render import surfaces
 from flexclear.post.render.layout import part_pose
 from flexclear.post.render.mechanism import Mechanism, drawn_points, skin
 from flexclear.post.render.surfaces import Surface
-from flexclear.post.shapes.body_shape import surface
 from flexclear.post.single_run.series import parameters
 
 #: longest arrow, and thickness of arrows, as fractions of the mechanism's size

@@ -15,7 +15,7 @@ from matplotlib.image import imsave
 from flexclear.post.overview import figures
 from flexclear.post.pages import media, viewer, viewer_page
 from flexclear.post.plotting import mode_sheet, style
-from flexclear.post.render import film_speed, gl, gltf, joint_view, panel, paraview, player, vibrations
+from flexclear.post.render import film_speed, gl, gltf, panel, paraview, player, vibrations
 from flexclear.post.render.mechanism import Looks, Mechanism, cloud, mechanism
 from flexclear.post.single_run.series import derive
 from flexclear.scene.quantity import Quantity
@@ -128,7 +128,7 @@ def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
     return shown.bundles
 
 
-def _side(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+def _view_of_body(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Return the direction of view of a body, and the upward direction."""
     view = player.side(bundle)
     return view.direction, view.up
@@ -137,14 +137,14 @@ def _side(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     for body, bundle in _bodies(shown).items():
-        files |= mode_sheet.files(f"modes_{body}", body, bundle, *_side(bundle))
+        files |= mode_sheet.files(f"modes_{body}", body, bundle, *_view_of_body(bundle))
     return files
 
 
 def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
     files = {}
     for body, bundle in _bodies(shown).items():
-        suffix, content = film_speed.write(mode_sheet.film_frames(body, bundle, *_side(bundle)), 12, kind)
+        suffix, content = film_speed.write(mode_sheet.film_frames(body, bundle, *_view_of_body(bundle)), 12, kind)
         files[f"modes_{body}.{suffix}"] = content
     return files
 
@@ -173,7 +173,7 @@ def _mode_series(shown: Shown, kind: str) -> dict[str, bytes]:
 
 def _joints(shown: Shown) -> dict[int, str]:
     """Return joints with clearance by their columns among the contacts."""
-    joints = joint_view.with_clearance(shown.of_run)
+    joints = panel.with_clearance(shown.of_run)
     if not joints:
         raise InputError("--what joint", "the scene has no joint with clearance", "show its motion")
     return {k: str(shown.of_run["contact"].values[k]) for k in joints}

@@ -13,12 +13,12 @@ import numpy as np
 import xarray as xr
 
 from flexclear.numerics.rotations import matrix_to_quaternion
+from flexclear.post import body_shape
+from flexclear.post.body_shape import box, faces, fields_of, hertz, linear_fields, scale_to
 from flexclear.post.overview.curves import in_unit, readable_unit
-from flexclear.post.render import film_speed, joint_view, layout, mechanism, surfaces
+from flexclear.post.render import film_speed, layout, mechanism, panel, surfaces
 from flexclear.post.render.vibrations import Vibrations
 from flexclear.post.render.view import View, axes_of, eye
-from flexclear.post.shapes import body_shape
-from flexclear.post.shapes.body_shape import box, faces, fields_of, hertz, linear_fields, scale_to
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2
@@ -65,7 +65,7 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, An
 
     contact: index of a joint with clearance, not of the end of a stop.
     """
-    steps, shown = _steps(run, looks, FRAMES), joint_view.drawn_joint(run, contact)
+    steps, shown = _steps(run, looks, FRAMES), panel.drawn_joint(run, contact)
     centre = run["contact_offset"].values[steps, contact]
     unturned = np.tile([1.0, 0.0, 0.0, 0.0, 1.0], (len(steps), 1))
     readings = [
@@ -77,7 +77,7 @@ def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks) -> dict[str, An
     ]
     return {
         "meshes": [
-            _still_part(shown.path, joint_view.PATH_COLOR, 1.0) | {"track": -1},
+            _still_part(shown.path, panel.PATH_COLOR, 1.0) | {"track": -1},
             _still_part(shown.mark, layout.CLEARANCE_COLOR, 1.0) | {"track": 0},
             _still_part(shown.room, layout.SOCKET_COLOR, 0.3) | {"track": -1},
         ],

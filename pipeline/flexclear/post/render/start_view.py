@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from flexclear.post.body_shape import has_edges
 from flexclear.post.overview.curves import in_unit
 from flexclear.post.plotting import style
 from flexclear.post.render import forms, layout, mechanism, player, surfaces
@@ -20,7 +21,6 @@ from flexclear.post.render.mechanism import Mechanism
 from flexclear.post.render.ruler import exaggeration, project, ruler
 from flexclear.post.render.surfaces import Surface
 from flexclear.post.render.view import flat, gravity
-from flexclear.post.shapes.body_shape import has_edges
 from flexclear.post.single_run.series import parameters
 from flexclear.scene.units import quantity
 

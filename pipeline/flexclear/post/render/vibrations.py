@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
+from flexclear.post.body_shape import hertz, linear_fields
 from flexclear.post.render import film_speed, surfaces
 from flexclear.post.render.layout import Part, part_pose, pose
 from flexclear.post.render.mechanism import COLORS, Flexible, Mechanism, rest, skin
-from flexclear.post.shapes.body_shape import hertz, linear_fields
 from flexclear.system.progress import Progress, silent
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size

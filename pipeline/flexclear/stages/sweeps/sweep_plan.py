@@ -17,13 +17,12 @@ from flexclear.artifacts import points as results
 from flexclear.artifacts.points import Point
 from flexclear.artifacts.quantities import regular_times
 from flexclear.artifacts.store import FAMILY, Record, Store
-from flexclear.scene import lines
-from flexclear.scene.design import Axis, Design, design
+from flexclear.scene import toml_files
 from flexclear.scene.limits import check_members, require_scatter
 from flexclear.scene.load import edited, with_numbers
 from flexclear.scene.quantity import Recorded, parse_recorded
 from flexclear.scene.schema import Scene, Sections
-from flexclear.scene.sweep import Sweep
+from flexclear.scene.sweep import Axis, Design, Sweep, design
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.sweeps.sweep_engine import Job
@@ -155,7 +154,7 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     try:
         simulation.check_parts(simulation.params(base))
     except InputError as error:
-        raise lines.with_line_number(lines.with_file_name(error, base.path)) from None
+        raise toml_files.with_line_number(toml_files.with_file_name(error, base.path)) from None
     recorded = tuple(_parse_kept_value(base, name, where) for name in sweep.keep)
     _check_recorded(sweep, base, sweep_design, recorded, where)
     _check_units(base, sweep_design, recorded, where)

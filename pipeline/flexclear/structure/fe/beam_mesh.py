@@ -12,7 +12,7 @@ import xarray as xr
 from flexclear.artifacts.schema import MESH, conform
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.segments import SAME_PLACE, cut_names, cuts
-from flexclear.structure.fe import section_recipe
+from flexclear.structure.fe import section
 from flexclear.structure.fe.beam_recipe import FRAME_ROTATION, BeamRecipe, Segment, segments
 from flexclear.structure.fe.section import POINTS
 from flexclear.structure.fe.vtu import vtu
@@ -126,12 +126,12 @@ def _segment_constants(recipe: BeamRecipe, part: Segment, tapers: bool) -> dict[
 
 def _section(recipe: BeamRecipe, part: Segment, s: np.ndarray) -> dict[str, np.ndarray]:
     """Return the section constants at the fractions s of a segment, each of shape (s,) or (s, 3)."""
-    stiffness = section_recipe.constants(part.section, part.end_section, s)
-    polar, about_y, about_z, product = section_recipe.inertia(part.section, part.end_section, part.inertia_section, s)
+    stiffness = section.constants(part.section, part.end_section, s)
+    polar, about_y, about_z, product = section.inertia(part.section, part.end_section, part.inertia_section, s)
     if recipe.theory == "euler-bernoulli":
         about_y = about_z = product = 0.0
     poisson = (part.material or recipe.material).poisson
-    kappa = section_recipe.shear_coefficient(part.section, part.end_section, s, poisson) or (np.nan, np.nan)
+    kappa = section.shear_coefficient(part.section, part.end_section, s, poisson) or (np.nan, np.nan)
     return {
         "area": _columns_at_points(s, stiffness.area),
         "second_moment": _columns_at_points(s, stiffness.torsion, stiffness.second_y, stiffness.second_z),

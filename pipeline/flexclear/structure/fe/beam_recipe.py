@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from flexclear.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, Positive
 from flexclear.scene.segments import SAME_PLACE
 from flexclear.structure.fe.recipe_parts import BodyRecipe, Isotropic, TurnedFrame
-from flexclear.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
+from flexclear.structure.fe.section import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
 

@@ -1,15 +1,21 @@
-"""Finite element model of a body, beam or solid, as reference conditions, reductions and integrals use it."""
+"""Finite element model of a body, beam or solid, as reference conditions, reductions and integrals use it.
+
+The functions that each kind of body has are listed by `Kind`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.numerics.rotations import skew
+from flexclear.system.errors import InputError
 
 #: directions of a frame's motion, in the order of all arrays of six
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -212,3 +218,33 @@ def own_dofs(held: sp.csr_array) -> np.ndarray | None:
     """Return the degree of freedom that each functional selects; None when a functional mixes several."""
     single = np.all(np.diff(held.indptr) == 1) and np.unique(held.indices).size == held.shape[0]
     return held.indices.astype(np.int64) if single else None
+
+
+def no_stresses(mesh: xr.Dataset, model: Model, vectors: np.ndarray, stiffening: bool, held: Interface | None) -> None:
+    """Return None: the stresses of the body are unknown; raise InputError where they are needed."""
+    if stiffening:
+        raise InputError("[body] stiffening", "matrices do not give the stresses of a body", "remove stiffening")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Functions of one kind of body.
+
+    build: the mesh dataset, from the recipe, the folder that its paths are relative to, and its name in messages.
+    vtu: a VTU file of the mesh dataset, for ParaView.
+    assemble: the model of the mesh dataset.
+    words: one word for the motion of each mode, from its family and vectors of shape (ndof, n).
+    cut: one segment of a mesh dataset; None for kinds without any.
+    exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
+        families and the interfaces' names; None for kinds without any.
+    second_order: second-order motion of vectors (ndof, n) that follows from stresses: without stiffening by forces and
+        accelerations (False), or with it, held at an interface, if any; None where it has no such part.
+    """
+
+    build: Callable[[Any, Path, str], xr.Dataset]
+    vtu: Callable[[xr.Dataset], bytes]
+    assemble: Callable[[xr.Dataset], Model]
+    words: Callable[[Model, list[str], np.ndarray], list[str]]
+    cut: Callable[[xr.Dataset, Sequence[int]], xr.Dataset] | None = None
+    exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] | None = None
+    second_order: Callable[[xr.Dataset, Model, np.ndarray, bool, Interface | None], SecondOrder | None] = no_stresses

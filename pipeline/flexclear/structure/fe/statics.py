@@ -19,7 +19,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from flexclear.structure.fe.model import Model, own_dofs
-from flexclear.structure.sparse.multifrontal import Factor, cholesky
+from flexclear.structure.sparse import Factor, cholesky
 from flexclear.system.errors import InputError, SolverError
 
 #: a pivot this small relative to its diagonal entry is rounding: the body moves there without strain

@@ -10,10 +10,9 @@ from flexclear.structure import closed_form
 from flexclear.structure.fe import beam as beams
 from flexclear.structure.fe import beam_loads, beam_mesh
 from flexclear.structure.fe.beam import N_DOFS, Beam
-from flexclear.structure.fe.model import Drawn, Families, Interface, Model, SecondOrder, interfaces, selection
+from flexclear.structure.fe.model import Drawn, Families, Interface, Kind, Model, SecondOrder, interfaces, selection
 from flexclear.structure.fe.section import Section, shape
 from flexclear.structure.fe.slices import integrate, slices
-from flexclear.structure.kinds.interface import Kind
 
 #: components along the rod's axes by family; the first one decides the sign
 FAMILIES: dict[str, tuple[int, ...]] = {"bending_y": (1, 5), "bending_z": (2, 4), "torsion": (3,), "axial": (0,)}

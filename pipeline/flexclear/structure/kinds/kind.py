@@ -1,4 +1,4 @@
-"""Meshes and models by the kind of body."""
+"""Meshes and models by the kind of body; bodies given by the matrices of another code, as a kind."""
 
 from __future__ import annotations
 
@@ -8,12 +8,22 @@ from typing import Any
 
 import xarray as xr
 
+from flexclear.structure.fe.exchange import matrices
+from flexclear.structure.fe.model import Kind
 from flexclear.structure.fe.recipe import parse
-from flexclear.structure.kinds import beam, matrices, name_of, solid
-from flexclear.structure.kinds.interface import Kind
+from flexclear.structure.kinds import beam, name_of, solid
 from flexclear.system.errors import InputError
 
-KINDS = {"beam": beam.KIND, "solid": solid.KIND, "matrices": matrices.KIND}
+KINDS = {
+    "beam": beam.KIND,
+    "solid": solid.KIND,
+    "matrices": Kind(
+        build=matrices.build,
+        vtu=matrices.as_vtu,
+        assemble=matrices.assemble,
+        words=lambda model, families, vectors: ["elastic"] * vectors.shape[1],
+    ),
+}
 #: name of a recipe in messages, where the caller has no better one
 PLACE = "mesh recipe"
 

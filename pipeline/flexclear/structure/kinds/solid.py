@@ -8,12 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.structure.fe.model import Interface, Model, SecondOrder
+from flexclear.structure.fe.model import Interface, Kind, Model, SecondOrder
 from flexclear.structure.fe.solid import mesh as meshes
-from flexclear.structure.fe.solid import prestress
-from flexclear.structure.fe.solid.model import assemble, solid_of, unknowns_of
+from flexclear.structure.fe.solid.model import assemble, forms, inertial_loads, solid_of, unknowns_of
 from flexclear.structure.fe.statics import Flexibility, border, support
-from flexclear.structure.kinds.interface import Kind
 
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5
@@ -49,8 +47,8 @@ def _second_order(
     """Return the second-order motion under the stresses of a free spin; with stiffening, under those of all loads."""
     flexibility, n = support(model, lambda fraction: None), vectors.shape[1]
     solid, unknowns = solid_of(mesh), unknowns_of(mesh)
-    spread, (line, nodal) = unknowns.spread, prestress.inertial(solid)
-    forms_of = partial(prestress.forms, mesh, solid, unknowns, vectors)
+    spread, (line, nodal) = unknowns.spread, inertial_loads(solid)
+    forms_of = partial(forms, mesh, solid, unknowns, vectors)
     if not stiffening:
         pairs = np.stack(np.triu_indices(3), axis=1)
         nodal = np.stack([0.5 * (nodal[:, k, l] + nodal[:, l, k]) for k, l in pairs], axis=1)
@@ -66,8 +64,8 @@ def _second_order(
         response, nodal = _free_body_response(flexibility, spread, line, nodal, loads)
     else:
         response = border(flexibility, held.motion).solve(loads)
-    forms = -forms_of(response, nodal)
-    moments, at_frames = forms[:12].reshape(4, 3, n, n), forms[12:].reshape(-1, 2, 3, n, n)
+    found = -forms_of(response, nodal)
+    moments, at_frames = found[:12].reshape(4, 3, n, n), found[12:].reshape(-1, 2, 3, n, n)
     return SecondOrder(moments[:3], moments[3], at_frames[:, 0], at_frames[:, 1])
 
 

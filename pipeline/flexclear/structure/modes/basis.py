@@ -12,9 +12,9 @@ import numpy as np
 
 from flexclear.structure.fe.model import Interface, Model
 from flexclear.structure.fe.statics import Flexibility, border
-from flexclear.structure.modes import deficits, eigen, normal
-from flexclear.structure.modes.condition import Condition
+from flexclear.structure.modes import deficits, normal
 from flexclear.structure.modes.normal import WHERE, Normal
+from flexclear.structure.modes.reference import Condition
 from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress
 
@@ -79,7 +79,7 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
     while True:
         modes = body.normal(min(tried, free))
         # static shapes alone are a basis; no shape at all is not
-        ends = [0] * bool(static.shape[1]) + [stop for _, stop in eigen.clusters(modes.values)]
+        ends = [0] * bool(static.shape[1]) + [stop for _, stop in normal.clusters(modes.values)]
         _check_first(modes, static, requested)
         # the last cluster may continue beyond the computed modes
         for stop in ends if tried >= free else ends[:-1]:
@@ -114,10 +114,10 @@ def whole(values: np.ndarray, n: int, static: int = 0) -> int:
     values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are retained unless all are.
     static: see `request`.
     """
-    for start, stop in eigen.clusters(values):
+    for start, stop in normal.clusters(values):
         if start < n < stop:
             counts = [c + static for c in (start, stop) if c + static > 0]
-            hertz = float(eigen.frequency(values[start : start + 1])[0])
+            hertz = float(normal.frequency(values[start : start + 1])[0])
             nearest = f"count is {counts[0]}" if len(counts) == 1 else f"counts are {counts[0]} and {counts[1]}"
             problem = f"{n + static} modes split a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz"
             raise InputError(WHERE, problem, f"the nearest whole {nearest}")
@@ -161,7 +161,7 @@ def _static_and_normal_shapes(body: Body, static: np.ndarray, modes: Normal, cou
 
 
 def _check_first(modes: Normal, static: np.ndarray, requested: ModeRequest) -> None:
-    first = float(eigen.frequency(modes.values[:1])[0])
+    first = float(normal.frequency(modes.values[:1])[0])
     if requested.up_to is not None and first > requested.up_to and not static.shape[1]:
         problem = f"no mode lies below {requested.up_to:.6g} Hz; the first is at {first:.6g} Hz"
         raise InputError("modes.up_to", problem, "request a higher frequency")
@@ -170,10 +170,10 @@ def _check_first(modes: Normal, static: np.ndarray, requested: ModeRequest) -> N
 def _has_enough_modes(body: Body, static: np.ndarray, modes: Normal, count: int, requested: ModeRequest) -> bool:
     if requested.up_to is not None:
         following = modes.values[count : count + 1]
-        return bool(following.size == 0 or eigen.frequency(following)[0] > requested.up_to)
+        return bool(following.size == 0 or normal.frequency(following)[0] > requested.up_to)
     vectors = _static_and_normal_shapes(body, static, modes, count)
     if requested.compliance is not None:
-        return deficits.least(body.flexibility(), body.interfaces, vectors)[0] >= requested.compliance
+        return deficits.least_fraction(body.flexibility(), body.interfaces, vectors)[0] >= requested.compliance
     return requested.mass is not None and _mass_fraction(body.model, vectors) >= requested.mass
 
 
@@ -188,7 +188,7 @@ def _mass_fraction(model: Model, vectors: np.ndarray) -> float:
 def _unreachable_error(body: Body, static: np.ndarray, modes: Normal, requested: ModeRequest) -> InputError:
     vectors = _static_and_normal_shapes(body, static, modes, len(modes.values))
     if requested.compliance is not None:
-        fraction, where = deficits.least(body.flexibility(), body.interfaces, vectors)
+        fraction, where = deficits.least_fraction(body.flexibility(), body.interfaces, vectors)
         problem = f"with every mode of this reference condition the basis has {fraction:.3g} of the compliance {where}"
         return InputError("modes.compliance", problem, 'choose one with static shapes, as reference = "craig-bampton"')
     fraction = _mass_fraction(body.model, vectors)

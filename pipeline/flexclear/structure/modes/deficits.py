@@ -35,8 +35,8 @@ import scipy.sparse as sp
 from flexclear.artifacts.compliance import fractions, frame_compliance
 from flexclear.structure.fe.model import DIRECTIONS, Interface, Model
 from flexclear.structure.fe.statics import Flexibility
-from flexclear.structure.modes import eigen, normal
-from flexclear.structure.modes.condition import in_own_axes
+from flexclear.structure.modes import normal
+from flexclear.structure.modes.reference import in_own_axes
 from flexclear.system.progress import Progress
 
 #: frequencies of the error bound, as fractions of the free body's first frequency
@@ -104,10 +104,10 @@ def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progre
     model = flexibility.model
     count = min(vectors.shape[1], COMPARED, model.size - 6)
     none = sp.csr_array((0, model.size))
-    full = eigen.frequency(normal.lowest(model, none, count, lambda: flexibility, progress, rough=True).values)
+    full = normal.frequency(normal.lowest(model, none, count, lambda: flexibility, progress, rough=True).values)
     shapes = flexibility.remove_momentum(vectors)
-    values, _ = eigen.rediagonalise(model.stiffness, model.mass, shapes)
-    resolved = np.abs(eigen.frequency(values)[:count] / full - 1.0) <= RESOLVED
+    values, _ = normal.rediagonalise(model.stiffness, model.mass, shapes)
+    resolved = np.abs(normal.frequency(values)[:count] / full - 1.0) <= RESOLVED
     whole = count if resolved.all() else int(np.argmin(resolved))
     return float(full[0]), float(full[whole - 1]) if whole else 0.0
 
@@ -158,7 +158,9 @@ def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vector
     return frame_compliance(motion, rigid, relief * scale, inner)
 
 
-def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
+def least_fraction(
+    flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray
+) -> tuple[float, str]:
     """Return the least compliance fraction between interfaces (of a single one: of the free body), and its location."""
     whole = full(flexibility, interfaces)
     each = fractions(of_basis(flexibility, interfaces, vectors), whole)

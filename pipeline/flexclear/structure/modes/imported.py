@@ -12,7 +12,7 @@ import xarray as xr
 
 from flexclear.structure.fe.model import Model, rigid_motion_force
 from flexclear.structure.fe.statics import Flexibility
-from flexclear.structure.modes import eigen, normal
+from flexclear.structure.modes import normal
 from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress
 
@@ -35,7 +35,7 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
     model = flexibility.model
     none = sp.csr_array((0, model.size))
     count = min(COMPARED, model.size - 6)
-    free = eigen.frequency(normal.lowest(model, none, count, lambda: flexibility, progress).values)[:count]
+    free = normal.frequency(normal.lowest(model, none, count, lambda: flexibility, progress).values)[:count]
     data = {"free_frequency": (("free_mode",), free)}
     mass, centre, inertia = rigid_properties(model)
     stated = float(mesh["listed_mass"]) if "listed_mass" in mesh else float(mesh.get("body_mass", np.nan))

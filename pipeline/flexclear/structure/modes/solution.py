@@ -14,10 +14,9 @@ from flexclear.scene.registry import lookup, suggestion
 from flexclear.structure.fe.model import DOFS, Interface, Model
 from flexclear.structure.fe.statics import Flexibility, support
 from flexclear.structure.kinds.kind import of_mesh
-from flexclear.structure.modes import basis, deficits, eigen, imported
+from flexclear.structure.modes import basis, deficits, imported, normal
 from flexclear.structure.modes.basis import ModeRequest
-from flexclear.structure.modes.condition import Condition, Given, check
-from flexclear.structure.modes.reference import CONDITIONS
+from flexclear.structure.modes.reference import CONDITIONS, Condition, Given, check
 from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress, silent
 
@@ -60,10 +59,10 @@ def solve(
     imported.require_definite(mesh, flexibility)
     body = basis.Body(model, condition, given.interfaces, flexibility, progress)
     shapes, rigid_frequency = basis.build(body, requested or ModeRequest(count=count))
-    values, vectors = eigen.rediagonalise(model.stiffness, model.mass, shapes)
-    vectors = eigen.orient(model, values, vectors)
-    families = eigen.family(model, vectors)
-    vectors = eigen.fix_signs(model, vectors, families)
+    values, vectors = normal.rediagonalise(model.stiffness, model.mass, shapes)
+    vectors = normal.orient(model, values, vectors)
+    families = normal.family(model, vectors)
+    vectors = normal.fix_signs(model, vectors, families)
     data = _variables(model, values, vectors)
     data["kind"] = (("mode",), np.array(kind.words(model, families, vectors)))
     exact = kind.exact(mesh, reference, families, names) if kind.exact is not None else {}
@@ -110,7 +109,7 @@ def _frame(model: Model, name: str) -> Interface:
 
 def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[str, Any]:
     return {
-        "frequency": (("mode",), eigen.frequency(values)),
+        "frequency": (("mode",), normal.frequency(values)),
         "shape": (("node", "dof", "mode"), model.drawn.nodal_motion(vectors)),
         "vector": (("unknown", "mode"), vectors),
         "node_position": (("node", "axis"), model.drawn.position),

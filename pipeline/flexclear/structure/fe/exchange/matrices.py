@@ -21,10 +21,10 @@ from flexclear.structure.fe.exchange.files import COMPONENTS, Contents, Table
 from flexclear.structure.fe.model import Drawn, Integrals, Model
 from flexclear.structure.fe.recipe import MatricesRecipe
 from flexclear.structure.fe.slices import Slices, at_centres, integrate, spread
-from flexclear.structure.fe.solid import ties
+from flexclear.structure.fe.solid.mesh import mean
 from flexclear.structure.fe.solid.model import families, integrals
 from flexclear.structure.fe.vtu import vtu
-from flexclear.structure.sparse.multifrontal import cholesky
+from flexclear.structure.sparse import cholesky
 from flexclear.system.errors import InputError, SolverError
 
 #: units of length [m], mass [kg] and time [s] of each consistent system
@@ -287,7 +287,7 @@ def frame_motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_arra
     if len(tied) == 1:
         return pick
     x = mesh["unknown_position"].values[rows[:, 0]]
-    return sp.csr_array(ties.mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x)) @ pick)
+    return sp.csr_array(mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x)) @ pick)
 
 
 def nodal_loads(mesh: xr.Dataset) -> dict[str, list[tuple[str, int, np.ndarray]]]:

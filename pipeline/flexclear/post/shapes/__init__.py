@@ -1,1 +1,0 @@
-"""Surfaces of deformed bodies, and stress on them, as numbers."""
