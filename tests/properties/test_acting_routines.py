@@ -121,9 +121,9 @@ def table(number: int) -> Table:
         if len(single) > 1 and number % 3 == 0
         else {}
     )
-    geared = (
-        {"train": {"first": single[0], "second": single[1], "ratio": 0.7}} if len(single) > 1 and not driven else {}
-    )
+    train = {"first": single[0], "second": single[-1], "ratio": 0.7}
+    teeth = {"backlash": 0.01, "stiffness": 1e5, "damping": 30.0} if number % 2 else {}
+    geared = {"train": train | teeth} if len(single) > 1 and not driven else {}
     acting = {"load": loads(random, number, made["joint"]), "stop": {"end": stop}, "gear": geared, "drive": driven}
     return made | acting
 

@@ -69,9 +69,9 @@ class _Contact(Part):
         return self.radius
 
     @property
-    def shape(self) -> tuple[float, float]:
+    def shape(self) -> tuple[float, float, float]:
         """Further sizes that the kernels of the surfaces need."""
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
 
     @property
     def pairs(self) -> dict[str, Pair]:
@@ -230,9 +230,9 @@ class ClearanceSlot(Pin):
     """elastic constants, for the stiffness"""
 
     @property
-    def shape(self) -> tuple[float, float]:
+    def shape(self) -> tuple[float, float, float]:
         """Half the length of the straight part [m]."""
-        return 0.5 * self.travel, 0.0
+        return 0.5 * self.travel, 0.0, 0.0
 
 
 class BallOnPlane(_Ball):

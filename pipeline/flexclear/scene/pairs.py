@@ -47,7 +47,7 @@ class Feature:
     name: str
     clearance: float
     share: ClassVar[float] = 1.0
-    shape: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    shape: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 0.0)
 
     def __getattr__(self, key: str) -> Any:
         """Return an attribute of the joint; copies are made before they have one."""

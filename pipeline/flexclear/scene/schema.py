@@ -415,6 +415,14 @@ class Scene(Part):
         flexible = {name: body.mesh for name, body in self.flexible().items()}
         return flexible | {name: body.mesh for name, body in self.meshed_bodies().items()}
 
+    def stops(self) -> dict[str, Stop | Gear]:
+        """Return the ends of coordinates by name: stops, and gears with backlash."""
+        return {**self.stop, **{name: gear for name, gear in self.gear.items() if gear.backlash is not None}}
+
+    def rigid_gears(self) -> dict[str, Gear]:
+        """Return the gears without backlash by name."""
+        return {name: gear for name, gear in self.gear.items() if gear.backlash is None}
+
     def contacts(self) -> dict[str, Clearance]:
         """Return the joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
@@ -430,7 +438,7 @@ class Scene(Part):
 
     def stop_ends(self) -> list[str]:
         """Return the names of all ends of stops, as in records."""
-        return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
+        return [f"{name}.{end}" for name, stop in self.stops().items() for end in stop.ends]
 
     def joints_with_friction(self) -> dict[str, IdealJoint]:
         """Return the ideal joints with friction, by name."""

@@ -6,6 +6,6 @@ from flexclear.dynamics.effects.effect import Effect
 
 STOPS = Effect(
     "stops",
-    lambda scene: () if scene.stop else None,
+    lambda scene: () if scene.stops() else None,
     touches=True,
 )
