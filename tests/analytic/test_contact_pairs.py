@@ -300,6 +300,7 @@ def test_a_slider_tilts_no_farther_than_the_bound_of_its_clearance_says() -> Non
 
 # Pins that tilt -------------------------------------------------------------------------------------------------------
 BEARING, PIN, RADIAL, AXIAL = 0.03, 0.01, 1e-4, 2e-4
+STEEL: Table = {"youngs_modulus": 2e11, "poisson": 0.3}
 PINNED: Table = {"clearance": RADIAL, "pin_radius": PIN, "length": BEARING, "normal": LINEAR}
 
 
@@ -358,12 +359,88 @@ def test_an_ideal_start_presses_both_ends_of_a_tilted_pin_and_a_collar() -> None
     assert dataset.contact_normal_force.values[0] == pytest.approx([27.0, 3.0, 20.0, 0.0], rel=1e-4, abs=1e-4)
 
 
+# Flat faces of collars: a ring on a plane, by points around ----------------------------------------------------------
+RING, TOUCHES = 0.02, 12
+FLAT: Table = {"axial_clearance": AXIAL, "collar_radius": RING, "collar_points": TOUCHES, "clearance": 5e-3}
+
+
+def test_a_tilted_collar_touches_first_at_its_lowest_point() -> None:
+    """Turned by a about y it reaches the journal's end where its ring is lowest, radius sin(a) ahead of its middle."""
+    speed, tilt = 0.2, 4e-3
+    table = pinned([0.0, 0.0, -speed], **FLAT)
+    table["body"]["body"]["pose"] = {"position": [0.0, 0.0, 0.0], "rotation_vector": [0.0, tilt, 0.0]}
+    dataset = simulate(table)
+    way = (AXIAL + 0.5 * BEARING * (1.0 - np.cos(tilt)) - RING * np.sin(tilt)) / np.cos(tilt)
+    found = impacts(dataset, contact="pin.thrust_1_1")
+    assert found["start"][0] == pytest.approx(way / speed, abs=1e-11)
+    assert found["approach"][0] == pytest.approx(speed * np.cos(tilt), rel=1e-9)
+    assert dataset.event_contact.values[0] == "pin.thrust_1_1"
+    assert np.abs(dataset.energy_error.values).max() < 1e-8 * float(dataset.kinetic[0])
+
+
+def test_a_flat_collar_rests_all_around_and_resists_tilt_as_a_ring_does() -> None:
+    """A force F and a moment M < F r/2: depth F/K, tilt 2 M/(K r^2), at any azimuth; the points' forces are F/n and
+    that of the tilt."""
+    load, moment, azimuth = 30.0, 0.1, 0.3
+    table = pinned([0.0] * 3, **FLAT)
+    axis = [-np.sin(azimuth), np.cos(azimuth), 0.0]
+    table["load"] = {
+        "along": {"type": "point-force", "frame": "body.F", "axes": "frame", "force": [0.0, 0.0, -load]},
+        "tilt": {"type": "point-torque", "frame": "body.F", "torque": [moment * one for one in axis]},
+        # nothing else holds the pin across its axis
+        "hold": {"type": "spring-damper", "between": ["ground.F", "body.F"], "stiffness": 10.0, "free_length": 0.0},
+    }
+    table["body"]["body"]["pose"] = {"position": [0.0, 0.0, -AXIAL]}
+    table["start"] = {"at": "equilibrium"}
+    dataset = simulate(table)
+    forces = dataset.contact_normal_force.values[0]
+    around = np.array([f"pin.thrust_1_{k + 1}" for k in range(TOUCHES)])
+    touching = np.isin(dataset.contact.values, around)
+    angles = 2.0 * np.pi * np.arange(TOUCHES) / TOUCHES
+    # the points are half a length above the body's middle, towards which the force turns with the tilt
+    moment /= 1.0 - load * BEARING / (STIFFNESS * RING**2)
+    known = load / TOUCHES + 2.0 * moment / (RING * TOUCHES) * np.cos(angles - azimuth)
+    # the spring takes 10 N/m times 0.2 mm of the load; squares of the tilt
+    assert forces[touching] == pytest.approx(known, abs=4e-4)
+    assert forces[~touching] == pytest.approx(np.zeros(TOUCHES + 2), abs=1e-12)
+    q = dataset.quaternion.sel(body="body").values[0]
+    assert 2.0 * q[1:3] == pytest.approx(2.0 * moment / (STIFFNESS * RING**2) * np.array(axis[:2]), rel=1e-3)
+
+
+def test_a_flat_collar_brakes_a_turning_pin_by_friction_at_its_radius() -> None:
+    """All around: the torque is mu F r, whatever the number of points."""
+    load, rate = 30.0, 200.0
+    rough = {"law": "ambrosio", "dynamic": 0.1, "v0": 0.0, "v1": 1e-3}
+    table = pinned([0.0] * 3, [0.0, 0.0, rate], **FLAT, friction=rough)
+    table["load"] = {"along": {"type": "point-force", "frame": "body.F", "force": [0.0, 0.0, -load]}}
+    depth = load / STIFFNESS
+    table["body"]["body"]["pose"] = {"position": [0.0, 0.0, -AXIAL - depth]}
+    table["joint"]["pin"]["initial_approach_speed"] = {f"thrust_1_{k + 1}": 0.0 for k in range(TOUCHES)}
+    dataset = simulate(table)
+    slower = 0.1 * load * RING / INERTIA[2] * dataset.time.values
+    assert dataset.angular_velocity.sel(body="body").values[:, 2] == pytest.approx(rate - slower, rel=1e-6)
+
+
+def test_an_ideal_start_presses_all_points_of_a_flat_collar() -> None:
+    table = pinned([0.0] * 3, **FLAT)
+    table["load"] = {"along": {"type": "point-force", "frame": "body.F", "force": [0.0, 0.0, -24.0]}}
+    table["start"] = {"at": "ideal"}
+    forces = simulated(Scene.model_validate(table)).contact_normal_force.values[0]
+    assert forces == pytest.approx([0.0, 0.0, *[2.0] * TOUCHES, *[0.0] * TOUCHES], abs=1e-6)
+
+
 #: change of the joint, and what the refusal says
 REFUSED_PINS: dict[str, tuple[Table, str]] = {
+    "flat and crowned": (FLAT | {"thrust_radius": 0.02}, "give one"),
+    "flat without gap": ({"collar_radius": 0.02}, "axial_clearance"),
+    "points without faces": ({"axial_clearance": AXIAL, "collar_points": 8}, "collar_points is of flat faces"),
+    "collar in the hole": (FLAT | {"collar_radius": 0.005}, "more than the journal's radius, 0.015 m"),
+    "collar of steel": (FLAT | {"normal": {"law": "hertz"}, "pin_material": STEEL, "journal_material": STEEL},
+                        "the stiffness of flat faces is unknown"),
     "collar without gap": ({"thrust_radius": 0.02}, "axial_clearance"),
     "wear": ({"axial_clearance": AXIAL, "wear": {"coefficient": 1e-4, "hardness": 2e9}}, "is not computed"),
     "unknown end": ({"initial_approach_speed": {"end_1": 0.1}}, "none, as the joint is one contact"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", REFUSED_PINS)

@@ -13,6 +13,7 @@ from flexclear import dynamics
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import tabulate
+from flexclear.dynamics.sensitivity.dataset import sensitivities
 from flexclear.scene.load import load_scene
 from flexclear.scene.parts import Gear
 from flexclear.scene.schema import Scene
@@ -202,7 +203,10 @@ def test_teeth_take_up_their_load_in_an_equilibrium_and_over_phases(tmp_path: Pa
     """A rack hangs on a held pinion: K x = m g. An event, and a run that goes on, know the middle of the backlash."""
     mass, g, r = 0.5, 9.81, 0.1
     bodies = {
-        "ground": ground(P=frame([0.0, 0.0, 0.0], [-np.pi / 2.0, 0.0, 0.0]), R=frame([0.1, 0.0, 0.0])),
+        "ground": {
+            "type": "ground",
+            "frames": {"P": frame([0.0] * 3, [-np.pi / 2.0, 0.0, 0.0]), "R": frame([0.1, 0.0, 0.0])},
+        },
         "pinion": rigid(1.0, 1e-3, {"O": frame([0.0] * 3, [-np.pi / 2.0, 0.0, 0.0])}),
         "rack": rigid(mass, 1e-3, {"O": frame([0.0] * 3)}) | {"pose": {"position": [0.1, 0.0, 0.0]}},
     }
@@ -231,10 +235,20 @@ def test_teeth_take_up_their_load_in_an_equilibrium_and_over_phases(tmp_path: Pa
     )
 
 
+def test_a_rattle_has_derivatives_by_backlash_and_stiffness() -> None:
+    """After a flank the play's coordinate is b - v (t - pi sqrt(I/K)); the second wheel turns by I/I2 of its change."""
+    loose = Scene.model_validate(wheels({"stiffness": STIFFNESS}, (20.0, 20.0 * RATIO + 1.0), end=0.022))
+    keys = ["gear.mesh.backlash", "gear.mesh.stiffness"]
+    found = sensitivities(loose, {}, silent, ["w1.joint_position"], keys)["w1.joint_position"]
+    share = REDUCED / INERTIAS[1]
+    known = [share, -share * 0.5 * np.pi * np.sqrt(REDUCED) * STIFFNESS**-1.5]
+    assert [float(found.sel(parameter=key).values[-1]) for key in keys] == pytest.approx(known, rel=1e-6)
+
+
 def test_a_stop_of_two_coordinates_is_a_buffer_between_their_bodies() -> None:
     """Two sliders of 1 and 3 kg on a rail: an elastic collision exchanges momentum as in the textbook."""
     speeds, masses, least = (2.0, -0.5), (1.0, 3.0), 0.1
-    bodies: Table = {"ground": ground(R=frame([0.0] * 3))}
+    bodies: Table = {"ground": ground(R=[0.0] * 3)}
     for k in range(2):
         bodies[f"s{k}"] = rigid(masses[k], 1.0, {"O": frame([0.0] * 3)}, velocity=[0.0, 0.0, speeds[k]])
         bodies[f"s{k}"]["pose"] = {"position": [0.0, 0.0, 0.5 * k]}

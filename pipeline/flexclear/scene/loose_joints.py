@@ -1,13 +1,14 @@
 """Joints of surfaces in contact: with clearance, in a slot, on a plane; geometry, materials and laws of each."""
 
 from collections.abc import Mapping
+from math import cos, sin, tau
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
 from flexclear.scene.clearance import Friction, Material, NormalLaw, Wear
 from flexclear.scene.fields import FrameName, Length, Part, Positive, Speed
-from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Seat, facing
+from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Seat, Station, facing
 
 #: approach speed of a contact
 Rate = Annotated[Speed, Field(ge=0.0)]
@@ -171,13 +172,31 @@ class ClearanceRevolute(_Tilting, _Worn):
     """gap between either end of the journal and the pin's collar there; the pin then tilts within its clearance, and
     nothing is held but by contacts at both ends and the collars"""
     thrust_radius: Annotated[Length, Positive] | None = None
-    """radius of curvature of the collars' faces; default: the pin's radius"""
+    """radius of curvature of crowned faces of the collars; default: the pin's radius"""
+    collar_radius: Annotated[Length, Positive] | None = None
+    """radius of flat faces of the collars, which touch the journal's ends there all around; default: crowned faces"""
+    collar_points: Annotated[int, Field(ge=3, le=360)] | None = None
+    """number of points all around at which flat faces of the collars may touch; default: 8"""
 
     @model_validator(mode="after")
     def _tilting(self) -> Self:
-        given = next((key for key in ("thrust_radius",) if getattr(self, key) is not None), "")
+        given = next((key for key in ("thrust_radius", "collar_radius") if getattr(self, key) is not None), "")
         if self.axial_clearance is None and given:
             raise ValueError(f"{given} is of collars, which need an axial_clearance; give both or neither")
+        if self.collar_points is not None and self.collar_radius is None:
+            raise ValueError("collar_points is of flat faces, which need a collar_radius; give both or neither")
+        if self.collar_radius is not None:
+            if self.thrust_radius is not None:
+                raise ValueError("thrust_radius is of crowned faces and collar_radius of flat ones; give one")
+            if self.normal.stiffness is None:
+                raise ValueError(
+                    "the stiffness of flat faces is unknown: give normal.stiffness, or leave out collar_radius"
+                )
+            if self.collar_radius <= self.pin_radius + self.clearance:
+                raise ValueError(
+                    f"collar_radius = {self.collar_radius:g} m must be more than the journal's radius, "
+                    f"{self.pin_radius + self.clearance:g} m: the face touches the end of the journal around its hole"
+                )
         if self.axial_clearance is not None and self.wear is not None:
             raise ValueError("the wear of a pin that tilts is not computed; leave out wear or axial_clearance")
         return self
@@ -189,15 +208,27 @@ class ClearanceRevolute(_Tilting, _Worn):
 
     @property
     def pairs(self) -> dict[str, Pair]:
-        """The pin in its journal; of one that tilts both ends, and the collars ``thrust_1`` at positive z and 2."""
+        """The pin in its journal; of one that tilts both ends, and the collars ``thrust_1`` at positive z and 2.
+
+        Flat collars touch at points ``thrust_1_1``, ``thrust_1_2`` ..., from x on about z of the journal.
+        """
         gap = self.axial_clearance
         if gap is None:
             return super().pairs
         made = self.rims
         for k, side in ((1, 1.0), (2, -1.0)):
-            crown = Crown(self, f"thrust_{k}", gap)
-            face = Seat((0.0, 0.0, side * 0.5 * self.length), facing(2, side))
-            made[crown.name] = Pair(crown, face, Seat((0.0, 0.0, side * (0.5 * self.length + gap + crown.radius))))
+            end, collar = side * 0.5 * self.length, side * (0.5 * self.length + gap)
+            if self.collar_radius is None:
+                crown = Crown(self, f"thrust_{k}", gap)
+                centre = Seat((0.0, 0.0, collar + side * crown.radius))
+                made[crown.name] = Pair(crown, Seat((0.0, 0.0, end), facing(2, side)), centre)
+                continue
+            face = Seat((0.0, 0.0, collar), facing(2, -side))
+            count = self.collar_points or 8
+            for j in range(count):
+                angle, station = tau * j / count, Station(self, f"thrust_{k}_{j + 1}", gap, count)
+                around = Seat((self.collar_radius * cos(angle), self.collar_radius * sin(angle), end))
+                made[station.name] = Pair(station, face, around, swapped=True)
         return made
 
 

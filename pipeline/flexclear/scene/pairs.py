@@ -95,6 +95,23 @@ class Crown(Feature):
         return float(self.joint.thrust_radius or self.joint.pin_radius)
 
 
+@dataclass(frozen=True)
+class Station(Feature):
+    """One of `count` points round the end of a journal, below the flat face of a pin's collar.
+
+    They rest on the journal while the pin turns; together they are the ring on which a flat face rests.
+    """
+
+    count: int
+
+    type, hollow, across, radius = "ball-on-plane", False, (2,), 0.0
+
+    @property
+    def share(self) -> float:  # type: ignore[override]
+        """Share of the stiffness and damping of the joint's normal law."""
+        return 1.0 / self.count
+
+
 def facing(axis: int, side: float) -> tuple[tuple[float, float, float], ...]:
     """Return axes, as of a `Seat`, whose z is a frame's axis, or for a `side` of -1 points the other way."""
     columns = ((axis + 1) % 3, side), ((axis + 2) % 3, 1.0), (axis, side)

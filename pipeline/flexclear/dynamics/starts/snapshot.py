@@ -19,8 +19,7 @@ from flexclear.scene.drives import JointDrive
 from flexclear.scene.fields import Pose
 from flexclear.scene.laws import Constant, Polynomial
 from flexclear.scene.loads import JointForce
-from flexclear.scene.loose_joints import Clearance
-from flexclear.scene.parts import Gear, Ground, Stop
+from flexclear.scene.parts import Gear, Ground
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import JointStart, ModalStart, Start
 from flexclear.scene.units import LARGEST_NUMBER
@@ -83,18 +82,17 @@ def with_poses_and_velocities(scene: Scene, engine: Engine, y: np.ndarray, t: fl
     return still.model_copy(update={"body": bodies, "start": start})
 
 
-def with_resting_contacts(scene: Scene, contacts: Mapping[str, Clearance], stops: Mapping[str, Stop | Gear]) -> Scene:
-    """Return the scene with those of these contacts, stops and gears at rest that are closed at the start."""
+def with_resting_contacts(scene: Scene, contacts: Iterable[str], *, stops: bool) -> Scene:
+    """Return the scene with those of these contacts at rest that are closed at the start; of stops and gears too."""
 
-    def at_rest(parts: Mapping[str, Any]) -> dict[str, Any]:
-        begun = [name for name, part in parts.items() if part.initial_approach_speed is None]
-        return {name: parts[name].model_copy(update={"initial_approach_speed": 0.0}) for name in begun}
+    def at_rest(family: str, names: Iterable[str]) -> dict[str, Any]:
+        parts = getattr(scene, family)
+        begun = [name for name in names if parts[name].initial_approach_speed is None]
+        return parts | {name: parts[name].model_copy(update={"initial_approach_speed": 0.0}) for name in begun}
 
-    ends = {
-        key: getattr(scene, key) | at_rest({n: p for n, p in stops.items() if p.family == key})
-        for key in ("stop", "gear")
-    }
-    return scene.model_copy(update={"joint": scene.joint | at_rest(contacts), **ends})
+    ends = scene.stops() if stops else {}
+    of_ends = {key: at_rest(key, [n for n, end in ends.items() if end.family == key]) for key in ("stop", "gear")}
+    return scene.model_copy(update={"joint": at_rest("joint", contacts), **of_ends})
 
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:
