@@ -377,7 +377,6 @@ def test_a_controller_that_makes_the_motion_unstable_is_refused(size: float, end
 
 HERTZ = {"law": "hertz", "stiffness": 1.0}
 STOP = {"joint": "A", "upper": 0.1, "normal": HERTZ}
-TEETH = {"first": "sun", "second": "P1", "ratio": -1.0, "backlash": "1 deg", "stiffness": 1e4}
 PID = {"type": "pid", "joint": "A", "reference": 1.0}
 NONE = [0.0] * 6
 
@@ -397,10 +396,6 @@ WRONG: dict[tuple[str, str], list[tuple[dict[str, Any], tuple[str, ...]]]] = {
         (STOP | {"normal": HERTZ | {"law": "kelvin-voigt", "restitution": 0.5}}, ("effective_mass",)),
         (STOP | {"normal": HERTZ | {"law": "flores"}}, ("stop.s.normal", "restitution")),
         (STOP | {"floor": -1.0}, ("stop.s.floor", "positive")),
-        (STOP | {"ratio": 2.0}, ("relative_to", "give both")),
-        (STOP | {"relative_to": "A"}, ("stop.s.relative_to", "is the coordinate itself")),
-        (STOP | {"relative_to": "B", "ratio": "1 m"}, ("stop.s.ratio", "number")),
-        (STOP | {"relative_to": "K"}, ("stop.s.relative_to", "no joint 'K'")),
     ],
     ("gears", "gear.g"): [
         ({"first": "sun", "second": "sun", "ratio": 2.0}, ("couples two coordinates",)),
@@ -409,14 +404,6 @@ WRONG: dict[tuple[str, str], list[tuple[dict[str, Any], tuple[str, ...]]]] = {
         ({"first": "wheel", "second": "rack", "ratio": "2 N"}, ("gear.g.ratio", "length per angle", "m/rad")),
         ({"first": "sun", "second": "P1", "ratio": 0.0}, ("ratio is 0", "drive")),
         ({"first": "ring_fixed", "second": "P1", "ratio": 1.0}, ("gear.g.first", "no coordinate")),
-        (TEETH | {"backlash": "-1 deg"}, ("gear.g.backlash", "must be positive, not -0.0174533 rad", "rigid teeth")),
-        (TEETH | {"backlash": "1 mm"}, ("gear.g.backlash", "a length", "angle")),
-        (TEETH | {"stiffness": None}, ("stiffness, normal says how stiff the teeth are", "nothing does")),
-        (TEETH | {"stiffness": -1.0}, ("gear.g.stiffness", "greater than 0")),
-        (TEETH | {"backlash": None}, ("stiffness is of teeth with a backlash",)),
-        (TEETH | {"normal": HERTZ}, ("stiffness and normal do",)),
-        (TEETH | {"stiffness": None, "normal": HERTZ, "damping": 1.0}, ("damping belongs to stiffness",)),
-        (TEETH | {"stiffness": None, "normal": {"law": "hertz"}}, ("stiffness of a flank is unknown",)),
     ],
     ("controllers", "load.c"): [
         (PID, ("needs a gain",)),

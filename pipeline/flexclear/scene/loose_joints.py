@@ -289,6 +289,7 @@ class ClearancePrismatic(_Several, _Clearance):
     It slides along z of the guide's frame. Without `width` it also moves across its height, along x, and turns about y,
     and the rest is held; with `width` and `side_clearance` nothing is held but by the contacts. Corners of the slider
     meet the faces of the guide, which are longer than its travel; those of a shorter guide meet the slider's faces.
+    With `faces = "bounded"` the slider may leave the guide: corners of both meet the other's faces as far as these go.
     """
 
     surfaces, ideal, plane = ("guide", "slider"), "prismatic", (0, 2)
@@ -304,7 +305,10 @@ class ClearancePrismatic(_Several, _Clearance):
     side_clearance: Annotated[Length, Positive] | None = None
     """gap on either side of the slider across its width"""
     guide_length: Annotated[Length, Positive] | None = None
-    """length of a guide that is shorter than the slider; default: longer than the slider's travel"""
+    """length of a guide that is shorter than the slider, or has bounded faces; default: longer than the slider's
+    travel"""
+    faces: Literal["bounded"] | None = None
+    """"bounded" for faces that end with the guide and the slider; default: unbounded ones"""
     corner_radius: Annotated[Length, Field(ge=0.0)] = 0.0
     """radius of the corners; default: sharp ones, which need a normal.stiffness"""
     guide_material: Material | None = None
@@ -320,10 +324,13 @@ class ClearancePrismatic(_Several, _Clearance):
                 f"{given} is given and {absent} is not: a slider that is loose across its width, too, needs both, "
                 "a plane one neither"
             )
-        if self.guide_length is not None and not self.guide_length < self.length:
+        if self.faces is not None and self.guide_length is None:
+            raise ValueError("bounded faces end with the guide, whose length is unknown: give guide_length")
+        if self.faces is None and self.guide_length is not None and not self.guide_length < self.length:
             raise ValueError(
                 f"guide_length = {self.guide_length:g} m is not below the slider's length, {self.length:g} m: it is of "
-                "a guide whose ends touch the slider's faces; leave it out where the slider's corners touch the guide"
+                "a guide whose ends touch the slider's faces; leave it out where the slider's corners touch the guide, "
+                'or give faces = "bounded" where it may leave the guide'
             )
         if self.normal.stiffness is None and not self.corner_radius:
             raise ValueError("the stiffness of sharp corners is unknown: give normal.stiffness, or corner_radius")
@@ -352,10 +359,23 @@ class ClearancePrismatic(_Several, _Clearance):
 
     @property
     def pairs(self) -> dict[str, Pair]:
-        """Pairs of a corner and the face above it: ``corner_1`` to 4 or 8 across the height, ``side_1`` to 8."""
-        short, r = self.guide_length is not None, self.corner_radius
-        ends = 0.5 * (self.guide_length or self.length) - r
-        sizes = (0.5 * self.height, 0.5 * (self.width or 0.0), 0.5 * (self.guide_length or self.length))
+        """Pairs of a corner and the face above it: ``corner_1`` to 4 or 8 across the height, ``side_1`` to 8.
+
+        With bounded faces those are of the slider, and ``guide_corner_1``, ``guide_side_1`` ... of the guide.
+        """
+        if self.faces is not None:
+            return self._corners(short=False) | self._corners("guide_", short=True)
+        return self._corners(short=self.guide_length is not None)
+
+    def _corners(self, kind: str = "", *, short: bool) -> dict[str, Pair]:
+        """Return the pairs of the slider's corners with the guide's faces, or of a short guide's with the slider's.
+
+        kind: what precedes their names.
+        """
+        r, own = self.corner_radius, (self.guide_length if short else None) or self.length
+        ends, other = 0.5 * own - r, self.length if short else self.guide_length
+        end = 0.5 * other if self.faces is not None and other is not None else 0.0
+        sizes = (0.5 * self.height, 0.5 * (self.width or 0.0), 0.5 * own)
         gaps, made = (self.clearance, self.side_clearance or 0.0, 0.0), dict[str, Pair]()
         # to the centre of a corner's sphere: of the slider's inwards from its faces, of the guide's outwards
         inset = tuple(size + gap + r if short else size - r for size, gap in zip(sizes, gaps, strict=True))
@@ -365,12 +385,13 @@ class ClearancePrismatic(_Several, _Clearance):
         ]
         for axis, prefix in zip(loose, ("corner", "side"), strict=False):
             for k, (x, y, z) in enumerate(signs, 1):
-                side, name = (x, y)[axis], f"{prefix}_{k}"
+                side, name = (x, y)[axis], f"{kind}{prefix}_{k}"
                 face = [0.0, 0.0, 0.0]
                 face[axis] = side * (sizes[axis] + (0.0 if short else gaps[axis]))
-                seats = Seat((face[0], face[1], face[2]), facing(axis, side if short else -side))
+                turn = 2 - axis if end else 1
+                seats = Seat((face[0], face[1], face[2]), facing(axis, side if short else -side, turn))
                 centre = Seat((x * inset[0], y * inset[1], z * ends))
-                made[name] = Pair(Corner(self, name, gaps[axis]), seats, centre, swapped=short)
+                made[name] = Pair(Corner(self, name, gaps[axis], end), seats, centre, swapped=short)
         return made
 
 

@@ -21,10 +21,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from flexclear.scene.ends import OF_TEETH
 from flexclear.scene.load import FAMILIES, SETTINGS, edited
 from flexclear.scene.loads import Bushing
 from flexclear.scene.loose_joints import SURFACES, Clearance
-from flexclear.scene.parts import OF_TEETH, UNSEEN
+from flexclear.scene.parts import UNSEEN
 from flexclear.scene.quantity import parse
 from flexclear.scene.registry import suggestion
 from flexclear.scene.schema import Scene

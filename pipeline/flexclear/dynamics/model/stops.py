@@ -11,7 +11,7 @@ from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model.driving import coordinate_of, named_coordinate
 from flexclear.dynamics.model.gears import coordinates_and_ratio, ratio_between
 from flexclear.scene.clearance import NormalLaw
-from flexclear.scene.parts import Gear, Stop
+from flexclear.scene.ends import Gear, Stop
 from flexclear.scene.schema import Scene
 from flexclear.scene.units import quantity_at
 from flexclear.system.errors import InputError, all_or_errors

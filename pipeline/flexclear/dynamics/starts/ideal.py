@@ -194,7 +194,7 @@ def _loads(engine: Engine, forces: Forces) -> Iterator[tuple[int, np.ndarray | f
             pressing = pair.contact.share * float(z @ force) * float(np.sign(pair.inner.origin[2]))
             if pressing > 0.0:
                 yield c, pressing
-        elif loose[owner].held is not None:
+        elif loose[owner].held is not None and not (pair.contact.end and pair.swapped):
             arm, push = pair.inner.origin[2], float(x @ force)
             slid = along if pair.swapped else 0.0
             load = 0.5 * (push + (float(y @ moment) + slid * push) / arm)

@@ -16,10 +16,11 @@ from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.numerics.rotations import matrix_to_quaternion
 from flexclear.scene.drives import JointDrive
+from flexclear.scene.ends import Gear
 from flexclear.scene.fields import Pose
 from flexclear.scene.laws import Constant, Polynomial
 from flexclear.scene.loads import JointForce
-from flexclear.scene.parts import Gear, Ground
+from flexclear.scene.parts import Ground
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import JointStart, ModalStart, Start
 from flexclear.scene.units import LARGEST_NUMBER
