@@ -1,16 +1,19 @@
-"""Joints of several contacts, loose sliders and pins that tilt, against closed forms and a second derivation."""
+"""Joints of several contacts, loose sliders, against closed forms and a second derivation."""
 
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.optimize import brentq
 
+from flexclear.dynamics.contact.surfaces.ball_on_strip import separation
 from flexclear.dynamics.linear.clearance_response import bounds
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.run.run import integrate
 from flexclear.dynamics.sensitivity.dataset import sensitivities
+from flexclear.dynamics.vectors import Matrix, Vector
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import parse
@@ -20,7 +23,15 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, impacts
 from tests.properties.mechanisms import LEAN, Table, frame, joint, matrix, rigid, scene, simulate, simulated, turned
-from tests.reference.sliders import corners, final_state, rigid_heights, rims
+from tests.reference.sliders import corners, final_state, rigid_heights
+
+
+class Sizes(NamedTuple):
+    """What a surface reads of a contact."""
+
+    radius: float
+    shape: tuple[float, float, float]
+
 
 MASS, INERTIA = 0.5, [6e-4, 4e-4, 2e-4]
 LENGTH, HEIGHT, WIDTH, GAP, SIDE = 0.1, 0.04, 0.06, 1e-3, 0.8e-3
@@ -197,6 +208,86 @@ def test_stiffer_corners_come_close_to_newtons_law_for_rigid_ones() -> None:
     assert np.array(away[:-1]) / np.array(away[1:]) == pytest.approx(np.full((2, 2), 10.0**0.4), rel=0.05)
 
 
+# Faces that end ------------------------------------------------------------------------------------------------------
+GUIDE = 0.15
+
+
+def test_the_gap_above_a_strip_is_the_distance_from_a_block_and_its_normal_the_gradient() -> None:
+    """Above, past the end, about the edge and inside; distances of a block as in any book on signed distances."""
+    half, radius = 0.02, 1e-3
+    numbers, random = Sizes(radius, (half, 0.0, 0.0)), np.random.default_rng(7)
+    for _ in range(200):
+        R, p, v = matrix(random.normal(size=3)), random.uniform(-0.04, 0.04, 3), random.normal(size=3)
+
+        def at(place: np.ndarray, R: np.ndarray = R, v: np.ndarray = v) -> tuple[float, float, np.ndarray, np.ndarray]:
+            found = separation(
+                numbers, Matrix(R.ravel().tolist()), Vector((R @ place).tolist()), Vector((R @ v).tolist())
+            )
+            return found.gap, found.approach, R.T @ np.array(found.normal), R.T @ np.array(found.turning)
+
+        gap, rate, normal, turning = at(p)
+        out = np.array([abs(p[0]) - half, p[2]])
+        assert gap == pytest.approx(np.linalg.norm(out.clip(0.0)) + min(out.max(), 0.0) - radius, abs=1e-15)
+        step = 1e-7
+        (after, _, n_after, _), (before, _, n_before, _) = at(p + step * v), at(p - step * v)
+        if min(abs(out[0] - out[1]), *abs(out)) < 1e-5:
+            continue  # its normal jumps or its curvature does
+        # differences over 1e-7 of numbers of 0.04
+        assert (after - before) / (2.0 * step) == pytest.approx(-rate, abs=1e-6)
+        assert (n_after - n_before) / (2.0 * step) == pytest.approx(turning, abs=1e-2 * (1.0 + np.abs(turning).max()))
+        assert np.linalg.norm(normal) == pytest.approx(1.0, rel=1e-14)
+
+
+def leaving(speed: float, end: float, **more: Any) -> xr.Dataset:
+    """A slider pressed by its weight to the guide that it leaves."""
+    law = {"law": "hertz", "exponent": 1.0, "stiffness": STIFFNESS}
+    table = sliding([0.0, 0.0, speed], end=end, faces="bounded", guide_length=GUIDE, normal=law, **more)
+    table["load"] = {"gravity": {"type": "gravity", "acceleration": [-9.81, 0.0, 0.0]}}
+    table["start"] = {"at": "equilibrium"}
+    return simulate(table)
+
+
+def test_a_slider_leaves_its_guide_by_one_corner_and_then_rests_on_the_guides_end() -> None:
+    """The front corner, deep by d = m g/2K, loses its face where that ends, when it meets the edge by less than d.
+
+    There it is pushed out by -K p, p < 0 the way to the end, while the force K d of the rear corner tips the slider:
+    p'' = -K p (1/m + height^2/4I) - K d height length/4I. The guide's corner meets the slider's face at the same time.
+    """
+    speed, inertia = 0.5, INERTIA[1]
+    found = leaving(speed, 0.055)
+    deep = MASS * 9.81 / (2.0 * STIFFNESS)
+    omega = np.sqrt(STIFFNESS * (1.0 / MASS + HEIGHT**2 / (4.0 * inertia)))
+    middle = -STIFFNESS * deep * HEIGHT * LENGTH / (4.0 * inertia) / omega**2
+
+    def way(t: float) -> float:
+        return middle - (deep + middle) * np.cos(omega * t) + speed / omega * np.sin(omega * t)
+
+    out = (0.5 * (GUIDE - LENGTH) - deep) / speed + brentq(way, 0.0, 2.0 * deep / speed, xtol=1e-18)
+    kinds, names, times = (found[f"event_{key}"].values for key in ("kind", "contact", "time"))
+    opening = times[(kinds == "opening") & (names == "guide.corner_3")]
+    closing = times[(kinds == "closing") & (names == "guide.guide_corner_3")]
+    # located to 1e-12 of a step
+    assert opening[0] == pytest.approx(out, abs=1e-11)
+    assert closing[0] == pytest.approx(out, abs=1e-11)
+    # beyond, the rear corner on the guide and the guide's on the slider carry it, until it tips over the edge
+    late = found.isel(time=-1)
+    carrying = {str(name) for name in late.contact.values if late.contact_normal_force.sel(contact=name) > 0.0}
+    assert carrying <= {"guide.corner_4", "guide.guide_corner_3"}
+    assert carrying
+    assert np.abs(found.energy_error.values).max() < 1e-8 * float(found.kinetic[0])
+
+
+def test_a_slider_beside_its_guide_touches_nothing() -> None:
+    """Half a length beyond the end, it falls past the face as if there were no guide."""
+    table = sliding([0.0, 0.0, 1.0], end=0.05, faces="bounded", guide_length=GUIDE)
+    table["body"]["body"]["pose"] = {"position": [0.0, 0.0, 0.5 * (GUIDE + LENGTH) + 1e-3]}
+    table["load"] = {"gravity": {"type": "gravity", "acceleration": [-9.81, 0.0, 0.0]}}
+    dataset = simulate(table)
+    t = dataset.time.values
+    assert dataset.position.sel(body="body").values[:, 0] == pytest.approx(-0.5 * 9.81 * t**2, abs=1e-11)
+    assert len(impacts(dataset)["start"]) == 0
+
+
 # What else a scene can ask of it --------------------------------------------------------------------------------------
 def test_the_ideal_counterpart_is_a_prismatic_joint_along_the_same_axis() -> None:
     loose = Scene.model_validate(sliding([0.0, 0.0, 2.0]))
@@ -222,6 +313,7 @@ def test_a_guide_may_be_turned_and_carried() -> None:
 #: change of the joint, and what the refusal says
 REFUSED: dict[str, tuple[Table, str]] = {
     "long guide": ({"guide_length": 0.2}, "the slider's corners touch the guide"),
+    "faces without end": ({"faces": "bounded"}, "give guide_length"),
     "no gap": ({"clearance": 0.0}, "clearance"),
     "half loose": ({"width": WIDTH}, "side_clearance"),
     "sharp steel": ({"normal": {"law": "hertz"}, "guide_material": {"youngs_modulus": 2e11, "poisson": 0.3},
@@ -296,78 +388,3 @@ def test_a_slider_tilts_no_farther_than_the_bound_of_its_clearance_says() -> Non
     # a part of the height's tilt counts as well: height tilt^2 / 2
     assert tilt.max() <= 2.0 * (GAP + deep) / LENGTH * (1.0 + 1e-3)
     assert np.abs(dataset.position.sel(body="body").values[:, 0]).max() <= GAP + deep
-
-
-# Pins that tilt -------------------------------------------------------------------------------------------------------
-BEARING, PIN, RADIAL, AXIAL = 0.03, 0.01, 1e-4, 2e-4
-PINNED: Table = {"clearance": RADIAL, "pin_radius": PIN, "length": BEARING, "normal": LINEAR}
-
-
-def pinned(velocity: Any, omega: Any = (0.0, 0.0, 0.0), kind: str = "clearance-revolute", **more: Any) -> Table:
-    """A pin in the middle of a fixed journal; more: of the joint."""
-    moving = rigid(MASS, INERTIA, {"F": {}}, pose={}, velocity=list(velocity), angular_velocity=list(omega))
-    pin = joint(kind, "ground.F", "body.F") | PINNED | more
-    return scene({"ground": {"type": "ground", "frames": {"F": {}}}, "body": moving}, {"pin": pin}, 0.005)
-
-
-def test_a_pin_that_does_not_tilt_moves_as_one_that_is_held() -> None:
-    """Both ends share stiffness and force of the joint in a plane. Friction would act deeper by the penetration."""
-    start, law = ([0.1, 0.05, 0.0], [0.0, 0.0, 30.0]), {"law": "kelvin-voigt", "stiffness": 1e6, "restitution": 0.5}
-    held, free = (simulate(pinned(*start, normal=law, **more)) for more in ({}, {"axial_clearance": AXIAL}))
-    assert list(held.contact.values) == ["pin"]
-    assert list(free.contact.values) == ["pin.end_1", "pin.end_2", "pin.thrust_1", "pin.thrust_2"]
-    for found, exact in zip(state(free), state(held), strict=True):
-        assert found == pytest.approx(exact, abs=1e-9)
-    assert free.joint_force.values == pytest.approx(held.joint_force.values, abs=1e-6)
-
-
-@pytest.mark.parametrize("kind", ["clearance-revolute", "clearance-cylindrical"])
-def test_tilting_pins_touch_the_ends_of_their_journals_as_in_a_second_derivation(kind: str) -> None:
-    """One end, then the other or a collar; the run and SciPy's are both good to about 1e-10."""
-    velocity, omega, crown = [0.1, 0.05, 0.2], [4.0, 2.0, 3.0], 0.015
-    thrust = {"axial_clearance": AXIAL, "thrust_radius": crown} if kind == "clearance-revolute" else {}
-    dataset = simulate(pinned(velocity, omega, kind, **thrust))
-    assert len(impacts(dataset)["start"]) >= 2
-    ends, z = rims(BEARING, PIN, RADIAL, 0.5 * STIFFNESS), np.array([0.0, 0.0, 1.0])
-    collars = [(s * (0.5 * BEARING + AXIAL + crown) * z, s * 0.5 * BEARING * z, s * z) for s in (1.0, -1.0)]
-    faces = corners(collars, STIFFNESS, crown)
-
-    def push(p: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        both = [ends(p, R), *([faces(p, R)] if thrust else [])]
-        return np.concatenate([forces for forces, _ in both]), np.concatenate([points for _, points in both])
-
-    known = final_state(push, 0.05 * np.sqrt(MASS / STIFFNESS), MASS, INERTIA, velocity, omega, 0.005)
-    for found, exact in zip(state(dataset), known, strict=True):
-        assert found == pytest.approx(exact, abs=1e-7 * max(1.0, float(np.abs(exact).max())))
-    assert np.abs(dataset.energy_error.values).max() < 1e-8 * float(dataset.kinetic[0])
-    force = dataset.joint_force.sel(joint="pin").values
-    assert force == pytest.approx(MASS * dataset.acceleration.sel(body="body").values, abs=1e-9 * np.abs(force).max())
-
-
-def test_an_ideal_start_presses_both_ends_of_a_tilted_pin_and_a_collar() -> None:
-    """By the lever: a force at 0.8 of the half length and one along the axis."""
-    table, at = pinned([0.0] * 3, axial_clearance=AXIAL), 0.4 * BEARING
-    table["body"]["body"]["frames"]["P"] = {"position": [0.0, 0.0, at]}
-    table["load"] = {
-        "across": {"type": "point-force", "frame": "body.P", "force": [-30.0, 0.0, 0.0]},
-        "along": {"type": "point-force", "frame": "body.F", "force": [0.0, 0.0, -20.0]},
-    }
-    table["joint"]["pin"]["normal"] = LINEAR | {"stiffness": 1e8}
-    table["start"] = {"at": "ideal"}
-    dataset = simulated(Scene.model_validate(table))
-    assert dataset.contact_normal_force.values[0] == pytest.approx([27.0, 3.0, 20.0, 0.0], rel=1e-4, abs=1e-4)
-
-
-#: change of the joint, and what the refusal says
-REFUSED_PINS: dict[str, tuple[Table, str]] = {
-    "collar without gap": ({"thrust_radius": 0.02}, "axial_clearance"),
-    "wear": ({"axial_clearance": AXIAL, "wear": {"coefficient": 1e-4, "hardness": 2e9}}, "is not computed"),
-    "unknown end": ({"initial_approach_speed": {"end_1": 0.1}}, "none, as the joint is one contact"),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED_PINS)
-def test_a_pin_that_cannot_tilt_is_refused_in_words(case: str) -> None:
-    changed, words = REFUSED_PINS[case]
-    with pytest.raises(ValueError, match=words):
-        Scene.model_validate(pinned([0.0] * 3, **changed))

@@ -18,8 +18,8 @@ from flexclear.dynamics.contact.law import Resolved
 from flexclear.dynamics.contact.validity import warnings
 from flexclear.dynamics.model.contacts import resolve_law
 from flexclear.scene.clearance import NormalLaw
+from flexclear.scene.ends import Stop
 from flexclear.scene.loose_joints import Clearance
-from flexclear.scene.parts import Stop
 from flexclear.system.errors import InputError
 from tests.properties.kernels import from_python
 

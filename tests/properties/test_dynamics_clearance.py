@@ -240,7 +240,8 @@ class Sizes(NamedTuple):
 
 
 def test_every_kind_of_surfaces_is_tried_here() -> None:
-    assert set(SURFACES) == set(surfaces_of_joints.SURFACES) == set(HALF_WIDTHS)
+    # strips are faces of sliders, in tests/analytic/test_contact_pairs
+    assert set(surfaces_of_joints.SURFACES) - {"ball-on-strip"} == set(SURFACES) == set(HALF_WIDTHS)
 
 
 def joint_of(kind: str, **more: Any) -> Any:

@@ -223,6 +223,13 @@ def test_recorded_wrenches_change_the_momentum_of_every_link(name: str) -> None:
             arm = here.sites["origin"][row["inner"]]
         turning = c >= model.arrays.size(m.N_SURFACES) and table(m.GAUGES)["turning"][row["surfaces"]]
         act(row["outer"], row["inner"], np.append(*((force, 0 * force) if turning else (np.cross(arm, force), force))))
+        if row["subtracted"] >= 0:  # the flank of a gear acts back on the first joint
+            gauges = [table(m.GAUGES)[row[name]] for name in ("surfaces", "subtracted")]
+            axes = [here.sites["axes"][one["b" if one["side"] else "a"]][:, one["axis"]] for one in gauges]
+            back = -table(m.CONTACT_NUMBERS)["shape"][c][2] * (force @ axes[0]) * axes[1]
+            arm = here.sites["origin"][gauges[1]["b"]]
+            both = (back, 0 * back) if gauges[1]["turning"] else (np.cross(arm, back), back)
+            act(gauges[1]["a"], gauges[1]["b"], np.append(*both))
     mass, numbers = momenta(here), table(m.LINK_NUMBERS)
     for i, frame in enumerate(here.links[1:], start=1):
         weight = numbers["mass"][i] * gravity

@@ -57,7 +57,7 @@ controller_motion? | controller | | {_MOTION}
 gear? | gear | | name of the gear
 gear_motion? | gear | | translation or rotation: kind of the gear's second coordinate
 contact? | contact | | name of the joint with clearance, or of the stop's end
-contact_type? | contact | | type of the joint with clearance, or stop
+contact_type? | contact | | type of the joint with clearance, or stop, or flank of a gear
 event_motion? | event | | rotation for an event along an angle, else translation
 contact_motion? | contact | | rotation for a contact that limits an angle, else translation
 rubbing? | rubbing | | name of the ideal joint with friction

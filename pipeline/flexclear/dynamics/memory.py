@@ -185,7 +185,8 @@ CLOSURES = topology("site_a site_b row0 n_rows support0 n_support jacobian0 kept
 CLOSURE_ROWS = topology("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = topology("coordinate")  # coordinates on which a closure depends
 #: outer, inner: sites; friction: its law or -1; bristle: index of the bristles' deflection in the state or -1
-CONTACTS = topology("outer inner normal friction surfaces bristle")  # surfaces: their kind; the gauge of a stop
+#: surfaces: their kind; the gauge of a stop.  subtracted: the gauge of the coordinate that a stop subtracts, or -1
+CONTACTS = topology("outer inner normal friction surfaces bristle subtracted")
 LAWS = topology("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = topology("harmonic0 n_harmonics last")  # last: see `drives.pieces.Pieces.last`
 #: kind: of `effects.Parts`; a: site, -1 where the reaction acts on the world; gauge, measured: of the joint coordinate
@@ -219,7 +220,7 @@ PORT_DATA = numbers("value")  # per port, r moving shapes: translation (3r), rot
 #: radius: of the inner surface; stiffness, exponent, damping, values: of the normal law (`contact.law.Numbers`); shape:
 #: further numbers of its kind of surfaces; length: size of the mechanism that it belongs to
 CONTACT_NUMBERS = numbers(
-    "clearance radius floor stick_speed stiffness exponent damping values:12 friction_law:6 shape:2 length"
+    "clearance radius floor stick_speed stiffness exponent damping values:12 friction_law:6 shape:3 length"
 )
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency

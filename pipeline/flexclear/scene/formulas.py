@@ -136,9 +136,9 @@ def laws_by_expression(scene: Any) -> Iterator[tuple[str, Any, dict[str, bool]]]
         for law in (getattr(joint, "normal", None), joint.friction):
             if law is not None and law.law == "expression":
                 yield f"joint.{name}", law, {}
-    for name, stop in scene.stop.items():
-        if stop.normal.law == "expression":
-            yield f"stop.{name}", stop.normal, {"turning": is_angle(scene, stop)}
+    for name, stop in scene.stops().items():
+        if stop.end_law.law == "expression":
+            yield f"{stop.family}.{name}", stop.end_law, {"turning": is_angle(scene, stop)}
 
 
 def _check(scene: Any, step: Any) -> None:

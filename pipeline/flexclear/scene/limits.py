@@ -75,7 +75,7 @@ def check_members(members: int, limits: Limits, where: str = "[ensemble.members]
 
 def require_scatter(scene: Any, where: str) -> None:
     """Raise InputError for a scene whose ensemble members would all be the same run."""
-    if not scene.contacts() and not scene.stop:
+    if not scene.contacts() and not scene.stops():
         problem = "members differ in their ball offsets, but the scene has neither clearance joint nor stop"
         raise InputError(where, problem, "remove it")
 

@@ -1,13 +1,14 @@
 """Joints of surfaces in contact: with clearance, in a slot, on a plane; geometry, materials and laws of each."""
 
 from collections.abc import Mapping
+from math import cos, sin, tau
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
 from flexclear.scene.clearance import Friction, Material, NormalLaw, Wear
 from flexclear.scene.fields import FrameName, Length, Part, Positive, Speed
-from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Seat, facing
+from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Seat, Station, facing
 
 #: approach speed of a contact
 Rate = Annotated[Speed, Field(ge=0.0)]
@@ -69,9 +70,9 @@ class _Contact(Part):
         return self.radius
 
     @property
-    def shape(self) -> tuple[float, float]:
+    def shape(self) -> tuple[float, float, float]:
         """Further sizes that the kernels of the surfaces need."""
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
 
     @property
     def pairs(self) -> dict[str, Pair]:
@@ -171,13 +172,31 @@ class ClearanceRevolute(_Tilting, _Worn):
     """gap between either end of the journal and the pin's collar there; the pin then tilts within its clearance, and
     nothing is held but by contacts at both ends and the collars"""
     thrust_radius: Annotated[Length, Positive] | None = None
-    """radius of curvature of the collars' faces; default: the pin's radius"""
+    """radius of curvature of crowned faces of the collars; default: the pin's radius"""
+    collar_radius: Annotated[Length, Positive] | None = None
+    """radius of flat faces of the collars, which touch the journal's ends there all around; default: crowned faces"""
+    collar_points: Annotated[int, Field(ge=3, le=360)] | None = None
+    """number of points all around at which flat faces of the collars may touch; default: 8"""
 
     @model_validator(mode="after")
     def _tilting(self) -> Self:
-        given = next((key for key in ("thrust_radius",) if getattr(self, key) is not None), "")
+        given = next((key for key in ("thrust_radius", "collar_radius") if getattr(self, key) is not None), "")
         if self.axial_clearance is None and given:
             raise ValueError(f"{given} is of collars, which need an axial_clearance; give both or neither")
+        if self.collar_points is not None and self.collar_radius is None:
+            raise ValueError("collar_points is of flat faces, which need a collar_radius; give both or neither")
+        if self.collar_radius is not None:
+            if self.thrust_radius is not None:
+                raise ValueError("thrust_radius is of crowned faces and collar_radius of flat ones; give one")
+            if self.normal.stiffness is None:
+                raise ValueError(
+                    "the stiffness of flat faces is unknown: give normal.stiffness, or leave out collar_radius"
+                )
+            if self.collar_radius <= self.pin_radius + self.clearance:
+                raise ValueError(
+                    f"collar_radius = {self.collar_radius:g} m must be more than the journal's radius, "
+                    f"{self.pin_radius + self.clearance:g} m: the face touches the end of the journal around its hole"
+                )
         if self.axial_clearance is not None and self.wear is not None:
             raise ValueError("the wear of a pin that tilts is not computed; leave out wear or axial_clearance")
         return self
@@ -189,15 +208,27 @@ class ClearanceRevolute(_Tilting, _Worn):
 
     @property
     def pairs(self) -> dict[str, Pair]:
-        """The pin in its journal; of one that tilts both ends, and the collars ``thrust_1`` at positive z and 2."""
+        """The pin in its journal; of one that tilts both ends, and the collars ``thrust_1`` at positive z and 2.
+
+        Flat collars touch at points ``thrust_1_1``, ``thrust_1_2`` ..., from x on about z of the journal.
+        """
         gap = self.axial_clearance
         if gap is None:
             return super().pairs
         made = self.rims
         for k, side in ((1, 1.0), (2, -1.0)):
-            crown = Crown(self, f"thrust_{k}", gap)
-            face = Seat((0.0, 0.0, side * 0.5 * self.length), facing(2, side))
-            made[crown.name] = Pair(crown, face, Seat((0.0, 0.0, side * (0.5 * self.length + gap + crown.radius))))
+            end, collar = side * 0.5 * self.length, side * (0.5 * self.length + gap)
+            if self.collar_radius is None:
+                crown = Crown(self, f"thrust_{k}", gap)
+                centre = Seat((0.0, 0.0, collar + side * crown.radius))
+                made[crown.name] = Pair(crown, Seat((0.0, 0.0, end), facing(2, side)), centre)
+                continue
+            face = Seat((0.0, 0.0, collar), facing(2, -side))
+            count = self.collar_points or 8
+            for j in range(count):
+                angle, station = tau * j / count, Station(self, f"thrust_{k}_{j + 1}", gap, count)
+                around = Seat((self.collar_radius * cos(angle), self.collar_radius * sin(angle), end))
+                made[station.name] = Pair(station, face, around, swapped=True)
         return made
 
 
@@ -230,9 +261,9 @@ class ClearanceSlot(Pin):
     """elastic constants, for the stiffness"""
 
     @property
-    def shape(self) -> tuple[float, float]:
+    def shape(self) -> tuple[float, float, float]:
         """Half the length of the straight part [m]."""
-        return 0.5 * self.travel, 0.0
+        return 0.5 * self.travel, 0.0, 0.0
 
 
 class BallOnPlane(_Ball):
@@ -258,6 +289,7 @@ class ClearancePrismatic(_Several, _Clearance):
     It slides along z of the guide's frame. Without `width` it also moves across its height, along x, and turns about y,
     and the rest is held; with `width` and `side_clearance` nothing is held but by the contacts. Corners of the slider
     meet the faces of the guide, which are longer than its travel; those of a shorter guide meet the slider's faces.
+    With `faces = "bounded"` the slider may leave the guide: corners of both meet the other's faces as far as these go.
     """
 
     surfaces, ideal, plane = ("guide", "slider"), "prismatic", (0, 2)
@@ -273,7 +305,10 @@ class ClearancePrismatic(_Several, _Clearance):
     side_clearance: Annotated[Length, Positive] | None = None
     """gap on either side of the slider across its width"""
     guide_length: Annotated[Length, Positive] | None = None
-    """length of a guide that is shorter than the slider; default: longer than the slider's travel"""
+    """length of a guide that is shorter than the slider, or has bounded faces; default: longer than the slider's
+    travel"""
+    faces: Literal["bounded"] | None = None
+    """"bounded" for faces that end with the guide and the slider; default: unbounded ones"""
     corner_radius: Annotated[Length, Field(ge=0.0)] = 0.0
     """radius of the corners; default: sharp ones, which need a normal.stiffness"""
     guide_material: Material | None = None
@@ -289,10 +324,13 @@ class ClearancePrismatic(_Several, _Clearance):
                 f"{given} is given and {absent} is not: a slider that is loose across its width, too, needs both, "
                 "a plane one neither"
             )
-        if self.guide_length is not None and not self.guide_length < self.length:
+        if self.faces is not None and self.guide_length is None:
+            raise ValueError("bounded faces end with the guide, whose length is unknown: give guide_length")
+        if self.faces is None and self.guide_length is not None and not self.guide_length < self.length:
             raise ValueError(
                 f"guide_length = {self.guide_length:g} m is not below the slider's length, {self.length:g} m: it is of "
-                "a guide whose ends touch the slider's faces; leave it out where the slider's corners touch the guide"
+                "a guide whose ends touch the slider's faces; leave it out where the slider's corners touch the guide, "
+                'or give faces = "bounded" where it may leave the guide'
             )
         if self.normal.stiffness is None and not self.corner_radius:
             raise ValueError("the stiffness of sharp corners is unknown: give normal.stiffness, or corner_radius")
@@ -321,10 +359,23 @@ class ClearancePrismatic(_Several, _Clearance):
 
     @property
     def pairs(self) -> dict[str, Pair]:
-        """Pairs of a corner and the face above it: ``corner_1`` to 4 or 8 across the height, ``side_1`` to 8."""
-        short, r = self.guide_length is not None, self.corner_radius
-        ends = 0.5 * (self.guide_length or self.length) - r
-        sizes = (0.5 * self.height, 0.5 * (self.width or 0.0), 0.5 * (self.guide_length or self.length))
+        """Pairs of a corner and the face above it: ``corner_1`` to 4 or 8 across the height, ``side_1`` to 8.
+
+        With bounded faces those are of the slider, and ``guide_corner_1``, ``guide_side_1`` ... of the guide.
+        """
+        if self.faces is not None:
+            return self._corners(short=False) | self._corners("guide_", short=True)
+        return self._corners(short=self.guide_length is not None)
+
+    def _corners(self, kind: str = "", *, short: bool) -> dict[str, Pair]:
+        """Return the pairs of the slider's corners with the guide's faces, or of a short guide's with the slider's.
+
+        kind: what precedes their names.
+        """
+        r, own = self.corner_radius, (self.guide_length if short else None) or self.length
+        ends, other = 0.5 * own - r, self.length if short else self.guide_length
+        end = 0.5 * other if self.faces is not None and other is not None else 0.0
+        sizes = (0.5 * self.height, 0.5 * (self.width or 0.0), 0.5 * own)
         gaps, made = (self.clearance, self.side_clearance or 0.0, 0.0), dict[str, Pair]()
         # to the centre of a corner's sphere: of the slider's inwards from its faces, of the guide's outwards
         inset = tuple(size + gap + r if short else size - r for size, gap in zip(sizes, gaps, strict=True))
@@ -334,12 +385,13 @@ class ClearancePrismatic(_Several, _Clearance):
         ]
         for axis, prefix in zip(loose, ("corner", "side"), strict=False):
             for k, (x, y, z) in enumerate(signs, 1):
-                side, name = (x, y)[axis], f"{prefix}_{k}"
+                side, name = (x, y)[axis], f"{kind}{prefix}_{k}"
                 face = [0.0, 0.0, 0.0]
                 face[axis] = side * (sizes[axis] + (0.0 if short else gaps[axis]))
-                seats = Seat((face[0], face[1], face[2]), facing(axis, side if short else -side))
+                turn = 2 - axis if end else 1
+                seats = Seat((face[0], face[1], face[2]), facing(axis, side if short else -side, turn))
                 centre = Seat((x * inset[0], y * inset[1], z * ends))
-                made[name] = Pair(Corner(self, name, gaps[axis]), seats, centre, swapped=short)
+                made[name] = Pair(Corner(self, name, gaps[axis], end), seats, centre, swapped=short)
         return made
 
 

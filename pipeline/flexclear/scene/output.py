@@ -1,4 +1,4 @@
-"""The output of a run: regular output times, data recorded on request only, and the description of variables.
+"""The output of a run: regular output times, data recorded on request, the description of variables; what is shown.
 
 A request is a key of ``[output]``, with the variables that it adds to the run's dataset below; the module of the same
 name in `dynamics.record` computes them.
@@ -11,7 +11,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from flexclear.scene.fields import Part, Position, Time, require_one
+from flexclear.scene.fields import Direction, Number, Part, Position, Positive, Time, require_one
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,3 +148,31 @@ axes_acceleration? | time loaded_body axis | rad s-2 | angular acceleration of t
 }
 #: the names of those variables
 ON_REQUEST = frozenset(name for schema in VARIABLES.values() for name in schema)
+
+
+class View(Part):
+    """Settings of what is examined and drawn; no effect on the motion."""
+
+    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """quantities that comparisons, tables and films show, as ``platform.position`` or ``A1.force - A2.force``; default:
+    those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts"""
+    direction: Direction | None = None
+    """viewing direction of pictures and films, a vector from the mechanism to the eye; default: normal to a planar
+    mechanism, else from above and in front"""
+    up: Direction | None = None
+    """upward direction in pictures, world axes; default: against gravity, else z"""
+    zoom: Annotated[Number, Positive] | None = None
+    """magnification of the mechanism against the usual size"""
+    exaggeration: Annotated[Number, Positive] | None = None
+    """magnification of drawn deformations against the computed ones; default: large enough to be visible"""
+    duration: Annotated[Time, Positive] | None = None
+    """duration of films; default: some 4 s"""
+    impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = None
+    """factor by which films run slower around impacts; default: 8; 1 runs evenly"""
+
+    @model_validator(mode="after")
+    def _check_directions(self) -> Self:
+        for direction in (self.direction, self.up):
+            if direction is not None and not any(direction):
+                raise ValueError("a direction must not have length zero")
+        return self

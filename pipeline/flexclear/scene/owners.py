@@ -31,7 +31,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         scene.pairs(),
         _still(name for name, body in scene.body.items() if not isinstance(body, Ground)),
     )
-    stops = {f"{name}.{end}": is_angle(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}
+    stops = {f"{name}.{end}": is_angle(scene, stop) for name, stop in scene.stops().items() for end in stop.ends}
     controllers = {name: load for name, load in forces.items() if isinstance(load, (Pid, SampledPid))}
     modes = {name: body.modes.count for name, body in scene.flexible().items()}
     unread = {name for name, mesh in scene.recipes().items() if not mesh}

@@ -47,7 +47,7 @@ class Feature:
     name: str
     clearance: float
     share: ClassVar[float] = 1.0
-    shape: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    shape: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 0.0)
 
     def __getattr__(self, key: str) -> Any:
         """Return an attribute of the joint; copies are made before they have one."""
@@ -67,10 +67,26 @@ class Feature:
         return float(self.radius)
 
 
+@dataclass(frozen=True)
 class Corner(Feature):
-    """Corner of one part of a sliding joint above a face of the other."""
+    """Corner of one part of a sliding joint above a face of the other.
 
-    type, hollow, across = "ball-on-plane", False, (2,)
+    end: half the length of the face, along x of its seat [m]; 0 for an unbounded one.
+    """
+
+    end: float = 0.0
+
+    hollow, across = False, (2,)
+
+    @property
+    def type(self) -> str:
+        """Kind of the surfaces."""
+        return "ball-on-strip" if self.end else "ball-on-plane"
+
+    @property
+    def shape(self) -> tuple[float, float, float]:  # type: ignore[override]
+        """Half the length of the face [m]."""
+        return self.end, 0.0, 0.0
 
 
 class Rim(Feature):
@@ -95,8 +111,28 @@ class Crown(Feature):
         return float(self.joint.thrust_radius or self.joint.pin_radius)
 
 
-def facing(axis: int, side: float) -> tuple[tuple[float, float, float], ...]:
-    """Return axes, as of a `Seat`, whose z is a frame's axis, or for a `side` of -1 points the other way."""
-    columns = ((axis + 1) % 3, side), ((axis + 2) % 3, 1.0), (axis, side)
+@dataclass(frozen=True)
+class Station(Feature):
+    """One of `count` points round the end of a journal, below the flat face of a pin's collar.
+
+    They rest on the journal while the pin turns; together they are the ring on which a flat face rests.
+    """
+
+    count: int
+
+    type, hollow, across, radius = "ball-on-plane", False, (2,), 0.0
+
+    @property
+    def share(self) -> float:  # type: ignore[override]
+        """Share of the stiffness and damping of the joint's normal law."""
+        return 1.0 / self.count
+
+
+def facing(axis: int, side: float, turn: int = 1) -> tuple[tuple[float, float, float], ...]:
+    """Return axes, as of a `Seat`, whose z is a frame's axis, or for a `side` of -1 points the other way.
+
+    turn: 1 or 2, the axis of the frame, counted from that one, along which x is.
+    """
+    columns = ((axis + turn) % 3, side if turn == 1 else -side), ((axis - turn) % 3, 1.0), (axis, side)
     x, y, z = ([value if k == row else 0.0 for k, value in columns] for row in range(3))
     return (x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])

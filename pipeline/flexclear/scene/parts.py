@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from flexclear.scene.bearings import JointFriction, require_fitting
-from flexclear.scene.clearance import NormalLaw
 from flexclear.scene.fields import (
     AngularVelocity,
     FrameName,
@@ -16,7 +15,6 @@ from flexclear.scene.fields import (
     Length,
     Mass,
     Number,
-    OnCoordinate,
     Part,
     PartName,
     Pose,
@@ -24,10 +22,8 @@ from flexclear.scene.fields import (
     Positive,
     Time,
     Velocity,
-    given_keys,
     require_one,
 )
-from flexclear.scene.laws import Value
 from flexclear.scene.loose_joints import Clearance
 from flexclear.scene.segments import FEWEST, MOST
 from flexclear.scene.units import quantity
@@ -330,56 +326,3 @@ class IdealJoint(Part):
 #: types of ideal joints
 IDEAL: tuple[str, ...] = get_args(IdealJoint.model_fields["type"].annotation)
 Joint = Annotated[IdealJoint | Clearance, Field(discriminator="type")]
-
-
-class Stop(OnCoordinate):
-    """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint."""
-
-    lower: Value | None = None
-    """ends of the coordinate, one or both; angles count full turns, from within half a turn of zero at the start"""
-    upper: Value | None = None
-    """ends of the coordinate, one or both; angles count full turns, from within half a turn of zero at the start"""
-    normal: NormalLaw
-    """normal law of contacts with its stiffness, for angles in N m and rad"""
-    floor: Value | None = None
-    """least approach speed used as impact rate; default: 1e-6 rad/s, or for lengths as in contacts"""
-    initial_approach_speed: Value | None = None
-    """impact rate of an end that the coordinate has passed at the start, 0 for a resting one; without this key such a
-    start is refused, unless it is an equilibrium"""
-
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
-        if self.lower is None and self.upper is None:
-            raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
-        if form := getattr(self.normal, "form", None):
-            raise ValueError(f"a stop has no radii, which the form '{form}' needs; give normal.stiffness")
-        if self.normal.needs_materials:
-            raise ValueError("the stiffness of a stop is unknown: give normal.stiffness")
-        if self.normal.needs_mass:
-            raise ValueError(
-                "the mass that meets a stop depends on the pose, so a linear stop needs a damping, "
-                "or a restitution with the effective_mass [kg or kg m^2] for that restitution"
-            )
-        return self
-
-    @property
-    def ends(self) -> tuple[str, ...]:
-        """Names of the given ends."""
-        return tuple(given_keys(self, ("lower", "upper")))
-
-
-class Gear(Part):
-    """A joint coordinate that follows another one: change of `second` = ratio times change of `first`."""
-
-    first: str
-    """joint (``A``), with the coordinate if the joint has several (``A.rotation``)"""
-    second: str
-    """joint (``A``), with the coordinate if the joint has several (``A.rotation``)"""
-    ratio: Value
-    """a number; between a translation and a rotation a length per angle ("10 mm/rad") or an angle per length"""
-
-    @model_validator(mode="after")
-    def _check_coordinates(self) -> Self:
-        if self.first == self.second:
-            raise ValueError(f"a gear couples two coordinates; first and second are both '{self.first}'")
-        return self

@@ -165,6 +165,9 @@ def _angles(scene: Scene) -> Iterator[InputError]:
         if is_angle(scene, stop):
             for end in stop.ends:
                 yield from _degrees(scene, f"stop.{name}.{end}", [getattr(stop, end)])
+    for name, gear in scene.gear.items():
+        if is_angle(scene, gear):
+            yield from _degrees(scene, f"gear.{name}.backlash", [gear.backlash])
 
 
 def _degrees(scene: Scene, key: str, values: list[Any]) -> Iterator[InputError]:

@@ -34,7 +34,7 @@ OWNERS = {
     "gear": "gear",
     "load": "load",
     "bushing": "bushing",
-    "contact": "joint with clearance, or end of a stop",
+    "contact": "joint with clearance, or end of a stop or of teeth with backlash",
     "rubbing": "joint with friction",
     "worn": "joint with wear",
     "mode": "mode, `body.number`",

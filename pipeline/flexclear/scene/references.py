@@ -19,7 +19,11 @@ from flexclear.system.errors import InputError
 Recipe = Callable[[str, Sequence[int] | None], Collection[str] | None]
 #: keys of parts that name frames; keys that name joints, alone or in front of a coordinate
 FRAMES = (("joint", "between"), ("load", "between"), ("drive", "frame"), ("load", "frame"))
-JOINTS = (*product(("drive", "load", "stop"), ("joint", "actuators")), ("gear", "first"), ("gear", "second"))
+JOINTS = (
+    *product(("drive", "load", "stop"), ("joint", "actuators")),
+    *product(("gear",), ("first", "second")),
+    ("stop", "relative_to"),
+)
 
 
 def dangling_names(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:

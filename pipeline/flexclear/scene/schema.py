@@ -7,26 +7,25 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from flexclear.scene import provenance
 from flexclear.scene.drives import Drive
+from flexclear.scene.ends import Gear, Stop
 from flexclear.scene.events import Event, require_possible
-from flexclear.scene.fields import Direction, Length, Number, Part, PartName, Positive, Time
+from flexclear.scene.fields import Length, Number, Part, PartName, Time
 from flexclear.scene.formulas import check_formulas
 from flexclear.scene.limits import Limits, check_members, check_rows
 from flexclear.scene.loads import Gravity, Load, SampledPid
 from flexclear.scene.loose_joints import CONTACTS, Clearance
 from flexclear.scene.notebook import as_html
-from flexclear.scene.output import OF_FLEXIBLE, ON_REQUEST, Output
+from flexclear.scene.output import OF_FLEXIBLE, ON_REQUEST, Output, View
 from flexclear.scene.owners import owners
 from flexclear.scene.pairs import Pair
 from flexclear.scene.parts import (
     Body,
     FlexibleBody,
-    Gear,
     Ground,
     IdealJoint,
     Joint,
     MeshedRigidBody,
     RigidBody,
-    Stop,
 )
 from flexclear.scene.quantity import KINDS, Quantity, default_quantities, parse
 from flexclear.scene.solver import NAMING, Solver
@@ -120,34 +119,6 @@ class Accuracy(Part):
         requested = {name: value for name, value in table.items() if name not in plain}
         accuracies = {name: _accuracy_request(name, value) for name, value in _leaves(requested, "")}
         return {"quantities": accuracies} | {name: table[name] for name in plain & set(table)}
-
-
-class View(Part):
-    """Settings of what is examined and drawn; no effect on the motion."""
-
-    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    """quantities that comparisons, tables and films show, as ``platform.position`` or ``A1.force - A2.force``; default:
-    those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts"""
-    direction: Direction | None = None
-    """viewing direction of pictures and films, a vector from the mechanism to the eye; default: normal to a planar
-    mechanism, else from above and in front"""
-    up: Direction | None = None
-    """upward direction in pictures, world axes; default: against gravity, else z"""
-    zoom: Annotated[Number, Positive] | None = None
-    """magnification of the mechanism against the usual size"""
-    exaggeration: Annotated[Number, Positive] | None = None
-    """magnification of drawn deformations against the computed ones; default: large enough to be visible"""
-    duration: Annotated[Time, Positive] | None = None
-    """duration of films; default: some 4 s"""
-    impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = None
-    """factor by which films run slower around impacts; default: 8; 1 runs evenly"""
-
-    @model_validator(mode="after")
-    def _check_directions(self) -> Self:
-        for direction in (self.direction, self.up):
-            if direction is not None and not any(direction):
-                raise ValueError("a direction must not have length zero")
-        return self
 
 
 def _leaves(table: dict[str, Any], where: str) -> list[tuple[str, Any]]:
@@ -415,6 +386,14 @@ class Scene(Part):
         flexible = {name: body.mesh for name, body in self.flexible().items()}
         return flexible | {name: body.mesh for name, body in self.meshed_bodies().items()}
 
+    def stops(self) -> dict[str, Stop | Gear]:
+        """Return the ends of coordinates by name: stops, and gears with backlash."""
+        return {**self.stop, **{name: gear for name, gear in self.gear.items() if gear.backlash is not None}}
+
+    def rigid_gears(self) -> dict[str, Gear]:
+        """Return the gears without backlash by name."""
+        return {name: gear for name, gear in self.gear.items() if gear.backlash is None}
+
     def contacts(self) -> dict[str, Clearance]:
         """Return the joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
@@ -430,7 +409,7 @@ class Scene(Part):
 
     def stop_ends(self) -> list[str]:
         """Return the names of all ends of stops, as in records."""
-        return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
+        return [f"{name}.{end}" for name, stop in self.stops().items() for end in stop.ends]
 
     def joints_with_friction(self) -> dict[str, IdealJoint]:
         """Return the ideal joints with friction, by name."""

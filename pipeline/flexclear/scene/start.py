@@ -149,8 +149,8 @@ class Start(Part):
 
 
 #: parts of a row: bodies' position, quaternion, velocity, angular velocity; positions of joint coordinates; modal
-#: coordinates and rates; approach speeds of closed contacts; internal states
-PARTS = ("body", "joint", "modal", "contact", "state")
+#: coordinates and rates; approach speeds of closed contacts; gaps of the flanks of gears; internal states
+PARTS = ("body", "joint", "modal", "contact", "gap", "state")
 #: two times are the same that differ by less than this fraction of the run
 SAME = 1e-9
 Row = dict[str, tuple[float, ...]]
@@ -218,6 +218,9 @@ def _parts(file: Any, row: int, time: float) -> Iterator[tuple[str, Any]]:
         yield f"modal.{name}", [value, rate]
     for name, value in zip(texts_of("internal"), here("internal_state"), strict=True):
         yield f"state.{name}", [value]
+    for name, kind, gap in zip(texts_of("contact"), texts_of("contact_type"), here("contact_gap"), strict=False):
+        if kind == "flank":
+            yield f"gap.{name}", [gap]
     columns = ("event_time", "event_kind", "event_contact", "event_approach_speed", "event_duration")
     events = [file[name][:].tolist() for name in columns] if "event_kind" in file.variables else []
     for begun, kind, contact, speed, duration in zip(*events, strict=True):

@@ -5,9 +5,10 @@ and gears couple the bodies and joints that they name; the fixed world couples n
 itself.
 
 An effect has the name of its key path: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
-``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant without effects differs from
-its scene by replaced and removed parts only, so that a file can state it by extending the scene's. Other parts, such as
-springs, are effects on request: their names are those of the parts. An ideal joint takes the place of a bushing.
+``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``, ``gear.X.backlash``. A variant without
+effects differs from its scene by replaced and removed parts only, so that a file can state it by extending the scene's.
+Other parts, such as springs, are effects on request: their names are those of the parts. An ideal joint takes the place
+of a bushing.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from flexclear.scene.ends import OF_TEETH
 from flexclear.scene.load import FAMILIES, SETTINGS, edited
 from flexclear.scene.loads import Bushing
 from flexclear.scene.loose_joints import SURFACES, Clearance
@@ -32,7 +34,7 @@ from flexclear.system.errors import InputError
 #: loads that are effects of the environment on a mechanism, and do not drive it
 OF_THE_WORLD = ("gravity", "joint-friction")
 #: kinds of effects, as in reports
-CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
+CLEARANCE, FLEXIBILITY, BACKLASH = "clearance", "flexibility", "backlash"
 #: effects that an ideal mechanism lacks, and the name of a scene without them
 EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
 #: kinds of effects on request: of these types of loads, others are forces
@@ -88,6 +90,9 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
         if load.type in OF_THE_WORLD:
             listed.append(Effect(f"load.{name}", "gravity" if load.type == "gravity" else "friction"))
     listed += [Effect(f"stop.{name}", "stop") for name in scene.stop]
+    listed += [
+        Effect(f"gear.{name}.backlash", BACKLASH) for name, gear in scene.gear.items() if gear.backlash is not None
+    ]
     return tuple(listed)
 
 
@@ -162,7 +167,8 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
 
     Raises InputError when the scene has none of them.
     """
-    gone = [effect for effect in effects(scene) if effect.kind in effects_gone]
+    kinds = {*effects_gone, *([BACKLASH] if CLEARANCE in effects_gone else [])}
+    gone = [effect for effect in effects(scene) if effect.kind in kinds]
     if not gone:
         raise InputError(
             str(scene.path or scene.name),
@@ -249,7 +255,8 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
         else:
             key = effect.name.split(".")[2]
             table = changes.get(f"{family}.{name}") or part.model_dump(mode="json", exclude_none=True)
-            changes[f"{family}.{name}"] = {k: v for k, v in table.items() if k != key}
+            gone_keys = OF_TEETH if effect.kind == BACKLASH else (key,)
+            changes[f"{family}.{name}"] = {k: v for k, v in table.items() if k not in gone_keys}
     return changes
 
 

@@ -161,7 +161,7 @@ class Graph:
                 other = Graph(self.scene, shown=False, recipe={**self.recipe, top: edit[top]})
                 more[f"varied/{k}/{path}"] = other.bundle[body]
         task = self._simulation("sensitivities", params)
-        run = {"run": self.simulate} if self.scene.contacts() or self.scene.stop else {}
+        run = {"run": self.simulate} if self.scene.contacts() or self.scene.stops() else {}
         return replace(task, inputs={**task.inputs, **run, **more}, names={}, folder="")
 
     @cached_property

@@ -56,7 +56,7 @@ def tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list[Task]:
 
 def _members(scene: Scene, members: int) -> int:
     """Return the number of members: 0 for a scene without contacts and stops, whose motion needs no ensemble."""
-    return members if scene.contacts() or scene.stop else 0
+    return members if scene.contacts() or scene.stops() else 0
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -63,7 +63,7 @@ def rank(
 
     effects, chosen = _examined(scene, of)
     removed, (setting, seconds) = _removed(scene, effects, IDEAL), own
-    levels = levels if scene.contacts() or scene.stop else (0,)
+    levels = levels if scene.contacts() or scene.stops() else (0,)
     full, tight = frozenset[str](), False
     while True:
         runs, sets = Members(workplace, chosen, budget, seconds), (full, *removed.values())

@@ -100,7 +100,7 @@ class Members:
 
     def _predict(self, name: Hashable, scene: Scene, members: int) -> float:
         """Return the predicted processor time of the members of a variant that have not run [s]."""
-        runs = members - self.known.get(name, 0) if scene.contacts() or scene.stop else 1
+        runs = members - self.known.get(name, 0) if scene.contacts() or scene.stops() else 1
         return runs * self.seconds.get(name, self.own) + POINT
 
     def points(self, variants: Mapping[Name, Scene], members: int) -> dict[Name, Point]:
@@ -196,6 +196,6 @@ def with_setting(variant: Scene, setting: Setting, *, tight: bool = False) -> Sc
     if setting.step is not None:
         return variant
     rigid = setting.integrator == VIBRATING and not variant.flexible()
-    means = (variant.contacts() or variant.stop) and not tight
+    means = (variant.contacts() or variant.stops()) and not tight
     rtol = max(setting.rtol, MEANS) if means else setting.rtol
     return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})

@@ -203,7 +203,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
         verdicts[:] = [effect_size.agreement(two, one, q, members, r) for q, r in zip(chosen, requested, strict=True)]
         return points if any(verdict(one) == UNDECIDED for one in verdicts) else ()
 
-    loose = planned.scene.contacts() or planned.scene.stop
+    loose = planned.scene.contacts() or planned.scene.stops()
     runs = Members(workplace, chosen, Budget(budget))
     both = {"full": full, "planned": planned.planned}
     members = runs.until_decided(both, MEMBERS if loose else MEMBERS[:1], undecided)["planned"]

@@ -117,7 +117,7 @@ def pressed_through(name: str, joint: Any, depth: float) -> str:
     )
 
 
-def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resolved]) -> str:
+def laws(contacts: Sequence[tuple[Any, ...]], resolved: Sequence[Resolved]) -> str:
     """Return the resolved law of every contact as JSON, for the dataset's attributes."""
     found = {
         name: {
@@ -129,6 +129,6 @@ def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resol
             "delivered_restitution": law.delivered,
             "friction": None if joint.friction is None else joint.friction.law,
         }
-        for (name, joint, _, _), law in zip(contacts, resolved, strict=True)
+        for (name, joint, *_), law in zip(contacts, resolved, strict=True)
     }
     return json.dumps(found, sort_keys=True)

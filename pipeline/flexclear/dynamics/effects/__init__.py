@@ -106,13 +106,13 @@ def _touches(scene: Scene) -> bool:
 
 def _own_forms(scene: Scene) -> list[str]:
     """Return the forms of tight fits, and the structures of expressions, of the scene's normal laws."""
-    laws = [part.normal for part in (*scene.contacts().values(), *scene.stop.values())]
+    laws = [joint.normal for joint in scene.contacts().values()] + [end.end_law for end in scene.stops().values()]
     return sorted({law.kind for law in laws} - {""})
 
 
 def _loops(scene: Scene) -> bool:
     """Return True when joints, contacts, paths or gears close loops; the tree may break some loops of shared bodies."""
-    if scene.gear:
+    if scene.rigid_gears():
         return True
     paths = [("", drive.frame) for drive in scene.drive.values() if isinstance(drive, PathDrive)]
     joined: dict[str, str] = {name: "" for name, body in scene.body.items() if body.type == "ground"}

@@ -89,7 +89,7 @@ STIFFENING = Effect(
 
 STOPS = Effect(
     "stops",
-    lambda scene: () if scene.stop else None,
+    lambda scene: () if scene.stops() else None,
     touches=True,
 )
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.internal_states import TURNS, internal_states
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.stops import End
@@ -31,15 +32,22 @@ def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray, known: Mapp
 
 
 def with_closed_contacts(scene: Scene, engine: Engine) -> Scene:
-    """Return the scene with initial approach speeds for the contacts that are closed in an engine's work space."""
-    joints, stops, closed = dict[str, Any](scene.joint), dict[str, Any](scene.stop), dict[str, dict[str, float]]()
+    """Return the scene with initial approach speeds for the contacts that are closed in an engine's work space, and the
+    middles of the backlash of gears."""
+    parts: dict[str, dict[str, Any]] = {key: dict(getattr(scene, key)) for key in ("joint", "stop", "gear")}
+    closed = dict[str, dict[str, float]]()
     for c, contact in enumerate(engine.model.contacts):
+        if contact.family == "gear" and contact.owner in scene.gear:
+            centre = float(engine.model.arrays.table(m.CONTACT_NUMBERS)["shape"][c][0]) - contact.joint.limit
+            gear = parts["gear"][contact.owner]
+            parts["gear"][contact.owner] = gear.model_copy(update={"centre": centre})
         if engine.modes[c]:
             speed = float(engine.latched[c])
             speed = 0.0 if speed >= NO_IMPACT else speed
             if isinstance(contact.joint, End):
+                stops = parts[contact.family]
                 stops[contact.owner] = stops[contact.owner].model_copy(update={"initial_approach_speed": speed})
             else:
                 closed.setdefault(contact.owner, {})[contact.name.partition(".")[2]] = speed
-    joints |= {name: joints[name].begun(speeds) for name, speeds in closed.items()}
-    return scene.model_copy(update={"joint": joints, "stop": stops})
+    parts["joint"] |= {name: parts["joint"][name].begun(speeds) for name, speeds in closed.items()}
+    return scene.model_copy(update=parts)

@@ -19,7 +19,12 @@ from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
 
 #: families of parts that act along joint coordinates, and their keys that name these
-ALONG = {"drive": ("joint",), "load": ("joint", "measured"), "stop": ("joint",), "gear": ("first", "second")}
+ALONG = {
+    "drive": ("joint",),
+    "load": ("joint", "measured"),
+    "stop": ("joint", "relative_to"),
+    "gear": ("first", "second"),
+}
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def simulated(
         phases[-1] = replace(phase, happened=happened)
         progress(None, f"at t = {phase.end:.6g} s: {event} ({happened.kind})")
     notes = [f"event {name} did not happen in this run" for name in waiting]
-    if scene.contacts() or scene.stop:
+    if scene.contacts() or scene.stops():
         notes.append("no predictability horizon with events: repeat the run from a perturbed start to estimate one")
     for note in notes:
         progress(None, f"warning: {note}")

@@ -45,6 +45,7 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
         books = cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
         results, form = [*tables.row(m.NAMED["touch"], c), *books], parts.forms[row["normal"]]
         given: tuple[Any, ...]
+        ends = [frames[row["outer"]], frames[row["inner"]]]
         if c < tables.size(m.N_SURFACES):
             if c in worn:
                 results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)
@@ -52,9 +53,10 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
             laws = form, parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
             given = parts.surfaces[row["surfaces"]], laws, int(c in worn), numbers, closed, latched, bristle
         else:
-            gauge, turns, rates = _gauge(tables, row["surfaces"])
-            given = form, gauge, numbers, closed, latched, turns
-        ends = [frames[row["outer"]], frames[row["inner"]]]
+            which = [int(row[name]) for name in ("surfaces", "subtracted") if row[name] >= 0]
+            how, turns, counts = zip(*(_gauge(tables, k) for k in which), strict=True)
+            given, rates = (form, how, numbers, closed, latched, turns), [cell for one in counts for cell in one]
+            ends = [frames[tables.table(m.GAUGES)[k][end]] for k in which for end in ("a", "b")]
         made.append(Action(touch if len(given) == 7 else stop, given, ends, [*results, *rates]))
     return made
 

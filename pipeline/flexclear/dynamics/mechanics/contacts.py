@@ -10,6 +10,7 @@ Source: Wang & Wang (2019), eqs. (23), (24).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from flexclear.dynamics.contact.form import FORMS
@@ -82,15 +83,26 @@ def touch(
 
 
 @routine
-def stop(form: str, gauge: Any, numbers: Any, closed: Any, latched: Any, turns: Numbers, *ends: End) -> Any:
-    """Return the same of the end of a joint coordinate, and the rate of its turns; the force acts along it."""
-    F, G = (site_motion(*end) for end in ends)
-    value, rate, unit = along(gauge, turns, F, G)
-    limit, sense = numbers.shape
+def stop(
+    form: str, gauges: Sequence[Any], numbers: Any, closed: Any, latched: Any, turns: Sequence[Numbers], *ends: End
+) -> Any:
+    """Return the same of the end of a joint coordinate, and the rates of turns; the force acts along it.
+
+    gauges, turns, ends: of the coordinate; then, if there is one, of that which is subtracted from it, ratio times.
+    """
+    sites, (limit, sense, ratio) = [site_motion(*end) for end in ends], numbers.shape
+    first, *others = (along(*one) for one in zip(gauges, turns, sites[::2], sites[1::2], strict=True))
+    value, rate = first.value, first.rate
+    for other in others:
+        value, rate = value - ratio * other.value, rate - ratio * other.rate
     gap, approach = sense * (limit - value), sense * rate
     law = branch(closed == 1, lambda: push(form, numbers, -gap, approach, latched), lambda: (0.0, 0.0, 0.0))
     N, taken, stored = law
-    wrench = unit * (-sense * N)
-    force = wrench.moment if gauge.turning else wrench.force
+    wrench = first.unit * (-sense * N)
+    force = wrench.moment if gauges[0].turning else wrench.force
+    wrenches = on_both(ends[:2], sites[1], wrench)
+    for other in others:
+        wrenches = *wrenches, *on_both(ends[2:], sites[3], other.unit * (ratio * sense * N))
+    counted = [one.rate for one, before in zip((first, *others), turns, strict=True) for _ in before]
     read = gap, approach, (N, 0.0, taken, stored, 0.0, 0.0), force, (numbers.clearance - gap, 0.0, 0.0), ZERO
-    return (read, (taken, 0.0, N), [rate for _ in turns]), on_both(ends, G, wrench), ()
+    return (read, (taken, 0.0, N), counted), wrenches, ()

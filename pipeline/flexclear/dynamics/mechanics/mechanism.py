@@ -148,10 +148,10 @@ class Closure(NamedTuple):
 
 
 class Action(NamedTuple):
-    """A contact or a load. frames: those between which it acts, and others that it reads.
+    """A contact or a load. frames: those on which it acts, and others that it reads.
 
     routine: takes what is given and the frames' ends, and returns what is stored in `results`, the wrenches on the
-    bodies of the first two frames, and powers.  book: of the ledger, for the first of these.
+    bodies of the first frames, and powers.  book: of the ledger, for the first of these.
     """
 
     routine: Callable

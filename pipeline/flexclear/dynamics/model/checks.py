@@ -35,7 +35,7 @@ def _checks_of_parts(scene: Scene) -> Iterator[Check]:
     yield partial(joint_drives, scene)
     yield from (partial(describe, scene, name) for name in scene.forces())
     yield partial(ends, scene, dict.fromkeys(scene.joint, 1.0))
-    yield from (partial(coordinates_and_ratio, scene, name) for name in scene.gear)
+    yield from (partial(coordinates_and_ratio, scene, name) for name in scene.rigid_gears())
     if scene.start is not None and scene.start.at != "ideal":  # else joints with clearance have coordinates, too
         yield partial(given_coordinates, scene)
 

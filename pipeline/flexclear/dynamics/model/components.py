@@ -33,7 +33,7 @@ class Components:
 
 
 def coupled_frames(scene: Scene) -> list[tuple[str, ...]]:
-    """Return the frames between which each part of a scene acts: joints, loads, gears and paths."""
+    """Return the frames between which each part of a scene acts: joints, loads, gears, stops and paths."""
 
     def of_joints(*names: str) -> tuple[str, ...]:
         return tuple(frame for name in names if name in scene.joint for frame in scene.joint[name].between)
@@ -44,7 +44,9 @@ def coupled_frames(scene: Scene) -> list[tuple[str, ...]]:
         measured, frame = getattr(part, "measured", None) or "", getattr(part, "frame", None)
         at = getattr(part, "between", None) or ([frame] if frame else [])
         parts.append((*at, *of_joints(getattr(part, "joint", ""), measured.partition(".")[0])))
-    parts += [of_joints(gear.first.partition(".")[0], gear.second.partition(".")[0]) for gear in scene.gear.values()]
+    pairs = [(gear.first, gear.second) for gear in scene.gear.values()]
+    pairs += [(stop.joint, stop.relative_to) for stop in scene.stop.values() if stop.relative_to is not None]
+    parts += [of_joints(*(text.partition(".")[0] for text in pair)) for pair in pairs]
     return parts
 
 

@@ -18,6 +18,7 @@ from flexclear.dynamics.contact.surfaces import SURFACES
 from flexclear.dynamics.contact.validity import SHALLOW
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.model.components import Floors, Group
+from flexclear.dynamics.model.flexible_bodies import start_place
 from flexclear.dynamics.model.gauges import Gauges
 from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.numbering import Numbering
@@ -66,17 +67,31 @@ def fill(
             friction = friction_law(joint)
             friction_kind = parts.frictions.index(joint.friction.kind)
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
+        subtracted = -1
         if isinstance(joint, End):
-            surfaces, shape = gauges.add(*sites, joint.coordinate, counts=True), (joint.limit, joint.sense)
+            surfaces = gauges.add(*sites, joint.coordinate, counts=True)
+            if contact.others:
+                of_first = (numbering.site(site) for site in contact.others)
+                subtracted = gauges.add(*of_first, joint.parts[1][1], counts=True)
+            shape = joint.limit + start_centre(mechanism, contact), joint.sense, joint.ratio
         else:
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
         bends = bristle(name, joint) is not None
-        rows.append((*sites, *kinds_of, first if bends else -1))
+        rows.append((*sites, *kinds_of, first if bends else -1, subtracted))
         first += 3 * bends
         sizes = (joint.clearance, joint.arm, _floor(joint, length))
         reals.append([*sizes, stick, *law.numbers[:3], *law.numbers.values, *numbers, *shape, length])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
+
+
+def start_centre(mechanism: Mechanism, contact: Contact) -> float:
+    """Return the coordinate to which a stop's ends refer [m or rad]: 0, or that of the start for a gear's flanks."""
+    if contact.joint.centre is not None:
+        return float(contact.joint.centre)
+    sites = contact.outer, contact.inner, *contact.others
+    poses = (mechanism.links[site.link].start.of(start_place(mechanism, site)) for site in sites)
+    return float(contact.joint.value(*poses))
 
 
 def part_of(mechanism: Mechanism, contact: Contact) -> int:

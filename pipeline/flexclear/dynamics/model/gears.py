@@ -77,7 +77,7 @@ class Coupling:
 
 def couplings(mechanism: Mechanism) -> list[Coupling]:
     """Return the couplings of all gears of a scene; raise InputError for impossible ones."""
-    return all_or_errors(partial(_coupling, mechanism, name) for name in mechanism.scene.gear)
+    return all_or_errors(partial(_coupling, mechanism, name) for name in mechanism.scene.rigid_gears())
 
 
 def _coupling(mechanism: Mechanism, name: str) -> Coupling:
@@ -95,12 +95,16 @@ def coordinates_and_ratio(scene: Scene, name: str) -> tuple[float, tuple[str, Co
     first, second = all_or_errors(
         partial(named_coordinate, scene, getattr(gear, side), f"[gear.{name}.{side}]") for side in ("first", "second")
     )
+    return ratio_between(f"[gear.{name}.ratio]", gear.ratio, first[1], second[1]), first, second
+
+
+def ratio_between(path: str, ratio: Any, first: Coordinate, second: Coordinate) -> float:
+    """Return the ratio of a second coordinate to a first one in SI; raise InputError for an impossible one."""
     dimensions = {(True, True): "number", (False, False): "number", (True, False): "length per angle"}
-    kinds, path = (first[1].turning, second[1].turning), f"[gear.{name}.ratio]"
-    ratio = quantity_at(path, gear.ratio, dimensions.get(kinds, "angle per length"))
-    if ratio == 0.0:
+    result = quantity_at(path, ratio, dimensions.get((first.turning, second.turning), "angle per length"))
+    if result == 0.0:
         raise InputError(path, "its ratio is 0, which would hold the second coordinate", "give a ratio, or drive it")
-    return ratio, first, second
+    return result
 
 
 def _side(mechanism: Mechanism, joint: str, coordinate: Coordinate, path: str) -> Side:

@@ -46,9 +46,8 @@ def internal_states(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
             yield ("load", name, scene.load[name].type), range(at, at + _states(scene, name))
     for contact, row in zip(model.contacts, arrays.table(m.CONTACTS), strict=True):
         if isinstance(contact.joint, End):
-            stop = scene.stop[contact.joint.stop]
-            joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, "")
-            yield from turns(int(row["surfaces"]), joint, coordinate)
+            for gauge, one in zip((row["surfaces"], row["subtracted"]), contact.joint.parts, strict=False):
+                yield from turns(int(gauge), *one)
         elif row["bristle"] >= 0:
             yield ("contact", contact.name), range(int(row["bristle"]), int(row["bristle"]) + 3)
     joints = list(scene.joints_with_friction())

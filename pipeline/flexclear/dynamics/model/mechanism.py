@@ -74,17 +74,24 @@ class Contact(NamedTuple):
     """A pair of features of a clearance joint, or an end of a stop: its name, its surfaces and laws, and two sites.
 
     outer, inner: of the socket or journal, and of the ball or pin; of a stop, of the joint's first and second frame.
+    others: likewise of the joint whose coordinate a stop subtracts.
     """
 
     name: str
     joint: Any
     outer: Site
     inner: Site
+    others: tuple[Site, ...] = ()
+
+    @property
+    def family(self) -> str:
+        """Family of the scene's parts that it belongs to."""
+        return self.joint.family if isinstance(self.joint, End) else "joint"
 
     @property
     def words(self) -> str:
         """Name of the contact in messages."""
-        return f"{'stop' if isinstance(self.joint, End) else 'joint'} {self.name}"
+        return f"{self.family} {self.name}"
 
     @property
     def owner(self) -> str:
@@ -94,7 +101,7 @@ class Contact(NamedTuple):
     @property
     def place(self) -> str:
         """Key path of the joint or stop in the scene."""
-        return f"{'stop' if isinstance(self.joint, End) else 'joint'}.{self.owner}"
+        return f"{self.family}.{self.owner}"
 
 
 @dataclass(frozen=True)
@@ -264,10 +271,12 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
     length, parts = sizes(scene, links, link_of, frames)
     far = {
         name: parts.lengths[parts.of(*_links_of(scene.joint[name], link_of))]
-        for name in {stop.joint for stop in scene.stop.values()} & scene.joint.keys()
+        for name in {stop.joint for stop in scene.stops().values()} & scene.joint.keys()
     }
     contacts = _contacts(scene.pairs(), at)
-    contacts += [Contact(name, end, at(end.between[0]), at(end.between[1])) for name, end in ends(scene, far)]
+    for name, end in ends(scene, far):
+        outer, inner, *others = (at(frame) for frame in end.frames)
+        contacts.append(Contact(name, end, outer, inner, tuple(others)))
     deformation = {link_of[name]: q for name, q in given_modes(scene, bundles).items()}
     return Mechanism(scene, frames, links, link_of, closures, contacts, origin, length, parts, deformation=deformation)
 

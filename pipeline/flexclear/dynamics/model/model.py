@@ -171,7 +171,7 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool)
         most_parts(mechanism.scene),
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
         forms=tuple(sorted({law.form for law in normals})),
-        closures=bool(mechanism.closures or mechanism.scene.gear),
+        closures=bool(mechanism.closures or mechanism.scene.rigid_gears()),
         harmonics=harmonics,
     )
 

@@ -42,13 +42,15 @@ class Separation(NamedTuple):
 
 
 def separations(mechanism: Mechanism) -> Iterator[Separation]:
-    """Yield the contacts in the mechanism's start pose."""
+    """Yield the contacts in the mechanism's start pose, but for ends of combined coordinates."""
     poses = [link.start for link in mechanism.links]
     for contact in mechanism.contacts:
         outer, inner = (poses[site.link].of(start_place(mechanism, site)) for site in (contact.outer, contact.inner))
         joint = contact.joint
+        if contact.others:  # the start of a run counts the turns of both coordinates, by which their difference jumps
+            continue
         if isinstance(joint, End):
-            beyond = joint.coordinate.value(outer, inner) - joint.limit
+            beyond = joint.value(outer, inner) - joint.limit
             yield Separation(contact, joint.sense * beyond, np.zeros(3), inner)
         else:
             surfaces = SURFACES[joint.type]

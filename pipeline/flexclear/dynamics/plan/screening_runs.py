@@ -109,7 +109,7 @@ class ScreeningRuns:
         return self._variants[names, self.refused_loose]
 
     def _made(self, bare: Scene) -> Scene:
-        contacts = bool(bare.contacts() or bare.stop)
+        contacts = bool(bare.contacts() or bare.stops())
         smooth = bool(bare.flexible()) and not contacts
         usual: dict[str, object] = (
             {"integrator": SMOOTH, "rtol": SMOOTH_RTOL} if smooth else {"integrator": DEFAULT, "rtol": RTOL}
@@ -171,7 +171,7 @@ class ScreeningRuns:
             end = scene.time.start + fraction * (scene.time.end - scene.time.start)
             scene = edited(scene, {f"solver.{k}": v for k, v in solver.items()} | {"time.end": end})
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
-            starts = members if scene.contacts() or scene.stop else 0
+            starts = members if scene.contacts() or scene.stops() else 0
             place = names, level, scene.solver.integrator
             runner = Runner(own, compared_values(scene.owners(), self.chosen), starts, engine=self._engines.get(place))
             measured = self.points[key] = runner.run(scene)

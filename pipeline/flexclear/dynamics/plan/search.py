@@ -125,7 +125,7 @@ def _requested(
     sizes = {name: sizes[name] for name in accuracies}
     if all(accuracies[name] >= size for name, size in sizes.items()):
         # forces and rates may come from impacts alone
-        more = simpler[1 if scene.contacts() or scene.stop else 0]()
+        more = simpler[1 if scene.contacts() or scene.stops() else 0]()
         there = {q.name: effect_size.size(more, q) for q in quantities if _has(more, q)}
         sizes = {name: max(size, there.get(name, 0.0)) for name, size in sizes.items()}
     if all(accuracies[name] >= size for name, size in sizes.items()):
@@ -322,7 +322,7 @@ def _chosen(search: Search) -> Chosen:
     """Choose number of modes, integrator and tolerance for the remaining effects."""
     runs, dropped = search.runs, search.dropped
     scene = runs.variant(dropped)
-    if scene.contacts() or scene.stop:
+    if scene.contacts() or scene.stops():
         return cheapest(search)
     for level in range(len(runs.fewer)):
         if not runs.modes(level, scene.flexible()):

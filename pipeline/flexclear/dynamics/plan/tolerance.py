@@ -69,7 +69,7 @@ def cheaper_method(search: Search, chosen: Chosen) -> Chosen:
     if own is None or chosen == UNCHANGED or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
         return chosen
     bare = runs.variant(dropped)
-    loose = bool(bare.contacts() or bare.stop)
+    loose = bool(bare.contacts() or bare.stops())
     fraction = runs.part(dropped) if loose else 1.0
     planned = runs.point(dropped, level=chosen.level, fraction=fraction, integrator=chosen.integrator, rtol=chosen.rtol)
     # no more evaluations of each member than the other run took
@@ -94,7 +94,7 @@ def scene_is_cheaper(search: Search, chosen: Chosen) -> bool:
         return True
     runs, dropped, scene = search.runs, search.dropped, search.runs.scene
     bare = runs.variant(dropped)
-    if scene.solver.step is not None or not (bare.contacts() or bare.stop):
+    if scene.solver.step is not None or not (bare.contacts() or bare.stops()):
         return False
     fewer = 1.0 if chosen.level is None else runs.saved(chosen.level)
     integrator, rtol = own_method(scene) or (DEFAULT, scene.solver.rtol)

@@ -14,6 +14,11 @@ def gear_series(model: Model, seen: Observed) -> Series:
     """Return the force [N] or torque [N m] of every gear along its second coordinate, on the joint's second body."""
     series = {coupling.gear: _force(model, seen, c, coupling) for c, coupling in _couplings(model)}
     turns = {coupling.gear: coupling.second.coordinate.turning for _, coupling in _couplings(model)}
+    for c, contact in enumerate(model.contacts):
+        if contact.family == "gear":
+            pushed = -contact.joint.sense * seen.touch["normal_force"][:, c]
+            series[contact.owner] = series.get(contact.owner, 0.0) + pushed
+            turns[contact.owner] = contact.joint.coordinate.turning
     names = list(model.scene.gear)
     return {"gear_force": (("time", "gear"), np.stack([series[name] for name in names], axis=1))}, {
         "gear": names,

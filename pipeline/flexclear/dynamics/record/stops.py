@@ -12,10 +12,13 @@ from flexclear.dynamics.model.stops import End
 def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Return all ends' wrenches on both frames: frame, moment about the mechanism's origin, force; (time, 3) each."""
     acting, numbering = [], model.numbering
-    for c, (_, end, outer, inner) in enumerate(model.contacts):
+    for c, (_, end, *both, others) in enumerate(model.contacts):
         if not isinstance(end, End):
             continue
-        a, b = (seen.sites[:, numbering.site(site)] for site in (outer, inner))
-        moment, force = end.coordinate.wrench(a, b, -end.sense * seen.touch["normal_force"][:, c])
-        acting += [(frame, sign * moment, sign * force) for frame, sign in zip(end.between, (-1.0, 1.0), strict=True)]
+        size, sites = -end.sense * seen.touch["normal_force"][:, c], [numbering.site(site) for site in (*both, *others)]
+        for k, ((_, coordinate), factor) in enumerate(zip(end.parts, (1.0, -end.ratio), strict=False)):
+            here = slice(2 * k, 2 * k + 2)
+            moment, force = coordinate.wrench(*(seen.sites[:, site] for site in sites[here]), factor * size)
+            frames = zip(end.frames[here], (-1.0, 1.0), strict=True)
+            acting += [(frame, sign * moment, sign * force) for frame, sign in frames]
     return acting

@@ -23,7 +23,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     bench, rest, _ = bench_in_equilibrium(placed(scene), bundles, progress)
     progress(None, f"starts at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
     rest_state = with_poses(scene, bench.engine, state(bench, rest.at.q), bench.time)
-    return with_resting_contacts(rest_state, scene.contacts(), scene.stop), bench.engine.model.mechanism.choice
+    return with_resting_contacts(rest_state, scene.contacts(), stops=True), bench.engine.model.mechanism.choice
 
 
 def placed(scene: Scene) -> Scene:

@@ -28,7 +28,7 @@ from flexclear.dynamics.run.evaluation.start import consistent_start, per_speed,
 from flexclear.dynamics.run.run import maker
 from flexclear.dynamics.starts.snapshot import with_held_drives, with_poses_and_velocities, with_resting_contacts
 from flexclear.scene.laws import Polynomial
-from flexclear.scene.pairs import Crown, Rim, Seat
+from flexclear.scene.pairs import Crown, Rim, Seat, Station
 from flexclear.scene.parts import IdealJoint
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import Start
@@ -69,7 +69,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
         choice = f"{choice}\nthe pins are not pressed into their sockets without moving given joint positions".strip()
         engine, y = _pressed(concentric, bundles, progress, forces)
     return with_resting_contacts(
-        with_poses_and_velocities(concentric, engine, y, t), replaceable_contacts(scene), {}
+        with_poses_and_velocities(concentric, engine, y, t), replaceable_contacts(scene), stops=False
     ), choice
 
 
@@ -190,11 +190,11 @@ def _loads(engine: Engine, forces: Forces) -> Iterator[tuple[int, np.ndarray | f
             end = pair.inner.origin[2]
             tilting = np.cross(moment, z) + (along + end) * force
             yield c, -(tilting - z * (z @ tilting)) / (2.0 * end)
-        elif isinstance(pair.contact, Crown):
-            pressing = float(z @ force) * float(np.sign(pair.inner.origin[2]))
+        elif isinstance(pair.contact, Crown | Station):
+            pressing = pair.contact.share * float(z @ force) * float(np.sign(pair.inner.origin[2]))
             if pressing > 0.0:
                 yield c, pressing
-        elif loose[owner].held is not None:
+        elif loose[owner].held is not None and not (pair.contact.end and pair.swapped):
             arm, push = pair.inner.origin[2], float(x @ force)
             slid = along if pair.swapped else 0.0
             load = 0.5 * (push + (float(y @ moment) + slid * push) / arm)

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from flexclear.artifacts.labelled import Labelled
+from flexclear.dynamics.model.driving import coordinate_of, label
+from flexclear.dynamics.model.stops import ends
 from flexclear.dynamics.starts.snapshot import writable
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.fields import Pose
@@ -65,8 +67,8 @@ def placed(scene: Scene) -> Scene:
         else body
         for name, body in scene.body.items()
     }
-    joints, stops = dict[str, Any](scene.joint), dict[str, Any](scene.stop)
-    for name in [*scene.contacts(), *scene.stop]:
+    joints, stops, gears = dict[str, Any](scene.joint), dict[str, Any](scene.stop), _centred_gears(scene)
+    for name in [*scene.contacts(), *scene.stops()]:
         speeds = {
             k.removeprefix(f"contact.{name}").removeprefix("."): max(v[0], 0.0)
             for k, v in row.items()
@@ -75,9 +77,27 @@ def placed(scene: Scene) -> Scene:
         if speeds and name in joints:
             joints[name] = joints[name].begun(speeds)
         elif speeds:
-            stops[name] = stops[name].model_copy(update={"initial_approach_speed": [*speeds.values()][-1]})
+            ends = stops if name in stops else gears
+            ends[name] = ends[name].model_copy(update={"initial_approach_speed": [*speeds.values()][-1]})
     start = scene.start.model_copy(update={"run": None, "time": None})
-    return scene.model_copy(update={"body": bodies, "joint": joints, "stop": stops, "start": start})
+    return scene.model_copy(update={"body": bodies, "joint": joints, "stop": stops, "gear": gears, "start": start})
+
+
+def _centred_gears(scene: Scene) -> dict[str, Any]:
+    """Return the gears of the scene with the middle of their backlash as it was in the recorded run."""
+    assert scene.start is not None
+    gears, row = dict[str, Any](scene.gear), scene.start.recorded
+    for name, end in ends(scene, dict.fromkeys(scene.joint, 1.0)):
+        gap, owner = row.get(f"gap.{name}"), name.partition(".")[0]
+        if end.family == "gear" and gap is not None and gears[owner].centre is None:
+            kinds = [
+                (joint, scene.joint[joint].type, coordinate_of(scene, joint, one.name, "")[1])
+                for joint, one in end.parts
+            ]
+            (second,), (first,) = (row[f"joint.{label(*kind)}"] for kind in kinds)
+            centre = second - end.ratio * first - end.limit + end.sense * gap[0]
+            gears[owner] = gears[owner].model_copy(update={"centre": centre})
+    return gears
 
 
 def _at(body: Any, recorded: tuple[float, ...], centre: np.ndarray) -> Any:

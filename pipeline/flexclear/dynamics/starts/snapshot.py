@@ -10,16 +10,17 @@ import numpy as np
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.model.driving import joint_drives
 from flexclear.dynamics.model.initial import centre_of
+from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.start_table import Given
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.numerics.rotations import matrix_to_quaternion
 from flexclear.scene.drives import JointDrive
+from flexclear.scene.ends import Gear
 from flexclear.scene.fields import Pose
 from flexclear.scene.laws import Constant, Polynomial
 from flexclear.scene.loads import JointForce
-from flexclear.scene.loose_joints import Clearance
-from flexclear.scene.parts import Ground, Stop
+from flexclear.scene.parts import Ground
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import JointStart, ModalStart, Start
 from flexclear.scene.units import LARGEST_NUMBER
@@ -49,7 +50,21 @@ def with_poses(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
         name: ModalStart(coordinate=tuple(q), velocity=given[name].velocity if name in given else None)
         for name, q in _modes(engine, y[: model.nq], model.numbering.modal_positions).items()
     }
-    return scene.model_copy(update={"body": bodies, "start": _start_without_poses(scene, modal)})
+    start = _start_without_poses(scene, modal)
+    return scene.model_copy(update={"body": bodies, "gear": _centred_gears(scene, engine), "start": start})
+
+
+def _centred_gears(scene: Scene, engine: Engine) -> dict[str, Gear]:
+    """Return the gears with the middle of their backlash, for angles that count from an evaluated pose on."""
+    gears, numbering = dict(scene.gear), engine.model.numbering
+    for c, contact in enumerate(engine.model.contacts):
+        name, end = contact.owner, contact.joint
+        if contact.family == "gear" and name in gears and gears[name].centre is None:
+            sites = [numbering.site(site) for site in (contact.outer, contact.inner, *contact.others)]
+            frames = [Placement(one["origin"], one["axes"]) for one in engine.table(m.SITE_FRAMES)[sites]]
+            centre = end.value(*frames) - end.limit + end.sense * engine.table(m.TOUCH)["gap"][c]
+            gears[name] = gears[name].model_copy(update={"centre": float(centre)})
+    return gears
 
 
 def with_poses_and_velocities(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
@@ -68,14 +83,17 @@ def with_poses_and_velocities(scene: Scene, engine: Engine, y: np.ndarray, t: fl
     return still.model_copy(update={"body": bodies, "start": start})
 
 
-def with_resting_contacts(scene: Scene, contacts: Mapping[str, Clearance], stops: Mapping[str, Stop]) -> Scene:
-    """Return the scene with those of these contacts and stops at rest that are closed at the start."""
+def with_resting_contacts(scene: Scene, contacts: Iterable[str], *, stops: bool) -> Scene:
+    """Return the scene with those of these contacts at rest that are closed at the start; of stops and gears too."""
 
-    def at_rest(parts: Mapping[str, Any]) -> dict[str, Any]:
-        begun = [name for name, part in parts.items() if part.initial_approach_speed is None]
-        return {name: parts[name].model_copy(update={"initial_approach_speed": 0.0}) for name in begun}
+    def at_rest(family: str, names: Iterable[str]) -> dict[str, Any]:
+        parts = getattr(scene, family)
+        begun = [name for name in names if parts[name].initial_approach_speed is None]
+        return parts | {name: parts[name].model_copy(update={"initial_approach_speed": 0.0}) for name in begun}
 
-    return scene.model_copy(update={"joint": scene.joint | at_rest(contacts), "stop": scene.stop | at_rest(stops)})
+    ends = scene.stops() if stops else {}
+    of_ends = {key: at_rest(key, [n for n, end in ends.items() if end.family == key]) for key in ("stop", "gear")}
+    return scene.model_copy(update={"joint": at_rest("joint", contacts), **of_ends})
 
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:

@@ -8,11 +8,18 @@ rate there, in axes of the world.  R_WA: axes of the outer frame.  numbers: of t
 
 from __future__ import annotations
 
-from flexclear.dynamics.contact.surfaces import ball_on_plane, clearance_revolute, clearance_slot, clearance_spherical
+from flexclear.dynamics.contact.surfaces import (
+    ball_on_plane,
+    ball_on_strip,
+    clearance_revolute,
+    clearance_slot,
+    clearance_spherical,
+)
 
 SURFACES = {
     "clearance-spherical": clearance_spherical,
     "clearance-revolute": clearance_revolute,
     "clearance-slot": clearance_slot,
     "ball-on-plane": ball_on_plane,
+    "ball-on-strip": ball_on_strip,
 }

@@ -127,7 +127,7 @@ class Search:
     @property
     def ratio(self) -> float:
         """Ratio of neighbouring tolerances of the ladder."""
-        smooth = self.predictable and not self.scene.contacts() and not self.scene.stop
+        smooth = self.predictable and not self.scene.contacts() and not self.scene.stops()
         return SMOOTH_RUNG if smooth else FINER_RUNG
 
     @property
