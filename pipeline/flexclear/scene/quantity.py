@@ -34,6 +34,7 @@ OWNERS = {
     "gear": "gear",
     "load": "load",
     "bushing": "bushing",
+    "film": "joint with a film",
     "contact": "joint with clearance, or end of a stop",
     "rubbing": "joint with friction",
     "worn": "joint with wear",
@@ -43,7 +44,7 @@ OWNERS = {
     "": "the whole mechanism",
 }
 #: prefixes of variables' names that name the kind of component
-_FRONTS = ("frame_", "joint_", "drive_", "controller_", "gear_", "load_", "bushing_", "contact_", "wear_")
+_FRONTS = ("frame_", "joint_", "drive_", "controller_", "gear_", "load_", "bushing_", "film_", "contact_", "wear_")
 #: variables whose quantity has another name
 _RENAMED = {"quaternion": "orientation", "joint_force": "force", "joint_moment": "moment", "contact_impulse": "impulse"}
 #: other words for a quantity
@@ -53,7 +54,7 @@ _INDICATORS = ("mobility", "rank", "condition")
 #: quantities that contacts have once per run or event, not over time
 OF_CONTACTS = ("peak_force", "impulse", "impact_times")
 #: owners that a scene without clearance does not have
-OF_CLEARANCE = ("contact", "worn")
+OF_CLEARANCE = ("contact", "worn", "film")
 EXPRESSION = "expression"
 COMPONENTS = ("x", "y", "z")
 

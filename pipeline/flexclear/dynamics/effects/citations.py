@@ -55,7 +55,8 @@ def sources(path: Path) -> tuple[str, ...]:
 def _named(scene: Scene) -> set[str]:
     """Return the names of the modules of the parts that a scene names."""
     values = flatten(scene.model_dump(mode="json", exclude_none=True))
-    return {text.strip('"').replace("-", "_") for key, text in values if key.rpartition(".")[2] in NAMING}
+    films = {film.type for film in scene.films().values()}
+    return films | {text.strip('"').replace("-", "_") for key, text in values if key.rpartition(".")[2] in NAMING}
 
 
 class Uses:

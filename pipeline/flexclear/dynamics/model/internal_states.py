@@ -80,7 +80,7 @@ def recorded_states(model: Model, y: np.ndarray) -> np.ndarray:
 
 def _coordinates(scene: Scene, name: str) -> list[tuple[str, Coordinate] | None]:
     """Return joint and coordinate along which a load acts, and those that it measures."""
-    load: Any = scene.load[name]
+    load: Any = scene.actions()[name]
     if not hasattr(load, "joint"):
         return [None, None]
     joint, _, coordinate = coordinate_of(scene, load.joint, load.coordinate, "")
@@ -91,6 +91,6 @@ def _coordinates(scene: Scene, name: str) -> list[tuple[str, Coordinate] | None]
 
 def _states(scene: Scene, name: str) -> int:
     """Return the number of internal states of a load, without turns."""
-    load: Any = scene.load[name]
+    load: Any = scene.actions()[name]
     given = [one[1] for one in _coordinates(scene, name) if one is not None]
     return int(LOADS[load.type].row(load, "", *given).states)

@@ -62,7 +62,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
 
     gauges: receives those of the loads and their internal states.
     """
-    scene, forces = mechanism.scene, mechanism.scene.forces()
+    scene, forces = mechanism.scene, mechanism.scene.actions()
     kind_of = {name: load_kind(scene, name) for name in forces}
     names = sorted(forces, key=kind_of.__getitem__)  # stable: the scene's order within a kind
     kinds = tuple(sorted(set(kind_of.values())))
@@ -122,8 +122,8 @@ class Description(NamedTuple):
 
 def describe(scene: Scene, name: str, given: Mapping[str, Pieces] = NO_LAWS) -> Description:
     """Return the description of a load; raise InputError for one that cannot exist.  given: as in `model.tabulate`."""
-    load: Any = scene.load[name]
-    path = f"[load.{name}]"
+    load: Any = scene.actions()[name]
+    path = f"[{getattr(load, 'place', f'load.{name}')}]"
     part = LOADS[load.type]
     coordinate: Coordinate | None = None
     measured: tuple[str, Coordinate] | None = None

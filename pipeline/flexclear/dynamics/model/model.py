@@ -76,7 +76,7 @@ class Model:
     def rows_of(self, *kinds: type) -> dict[str, np.ndarray]:
         """Return the rows of the table LOADS of all loads of the given types, by name, in the order of the scene."""
         rows = {name: row for (name, _), row in zip(self.loads, self.arrays.table(m.LOADS), strict=True)}
-        return {name: rows[name] for name, load in self.scene.forces().items() if isinstance(load, kinds)}
+        return {name: rows[name] for name, load in self.scene.actions().items() if isinstance(load, kinds)}
 
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NO_LAWS) -> Model:

@@ -41,7 +41,7 @@ def blocks(mechanism: Mechanism, parts: Parts, energies: Floors, lengths: Floors
     return {
         "mechanism": of_the_first * m.CONTACT_SLOTS,
         **contacts.ledger(mechanism, energies, lengths),
-        "loads": of_the_first * (LOADS if mechanism.scene.forces() else 0),
+        "loads": of_the_first * (LOADS if mechanism.scene.actions() else 0),
         **{name: LEDGERS[name](mechanism, energies, lengths) for name in effects},
         "books": [(float(energy), OTHER_BOOKS, part) for part, energy in enumerate(energies) if part],
     }
