@@ -44,7 +44,7 @@ OWNERS = {
     "": "the whole mechanism",
 }
 #: prefixes of variables' names that name the kind of component
-_FRONTS = ("frame_", "joint_", "drive_", "controller_", "gear_", "load_", "bushing_", "film_", "contact_", "wear_")
+_FRONTS = ("frame_", "joint_", "drive_", "controller_", "gear_", "load_", "bushing_", "contact_", "wear_")
 #: variables whose quantity has another name
 _RENAMED = {"quaternion": "orientation", "joint_force": "force", "joint_moment": "moment", "contact_impulse": "impulse"}
 #: other words for a quantity

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.linalg import solveh_banded
 
-from flexclear.dynamics.loads.film import half_circle
+from flexclear.dynamics.loads.half_circle import half_circle
 
 #: intervals around the half journal, on the coarser of two grids; cosines along the axis
 INTERVALS, COSINES = 120, 16
