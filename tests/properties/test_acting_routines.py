@@ -114,7 +114,8 @@ def table(number: int) -> Table:
         if (number + k) % 3 == 0 and "slot" not in joint["type"] and "plane" not in joint["type"]:
             joint["wear"] = {"coefficient": 1e-4, "hardness": 1e9}
         if (number + k) % 2 == 0 and joint["type"] in ("clearance-revolute", "clearance-spherical"):
-            joint["film"] = {"viscosity": 0.1}
+            # forces of thin films take the fifth power of the rounding of an eccentricity of 1
+            joint["film"] = {"viscosity": 0.1, "roughness": 0.3 * joint["clearance"]}
     single = [name for name, one in made["joint"].items() if one["type"] in ("revolute", "prismatic")]
     law = list(NORMAL)[number % len(NORMAL)]
     stop = {"joint": single[0], "lower": -0.4, "upper": 0.5, "normal": {"law": law, "stiffness": 1e5} | NORMAL[law]}

@@ -56,7 +56,7 @@ def integrals(a: float, b: float, slenderness: float, intervals: int) -> np.ndar
     edges = np.array([-0.5, 0.5]) * np.pi - towards
     turns = 2.0 * np.pi * np.round(edges / (2.0 * np.pi))
     ends = 2.0 * np.arctan(stretch * np.tan(0.5 * (edges - turns))) + turns
-    angle = np.linspace(*ends, 2 * intervals + 1)  # nodes, with the middles between them
+    angle = np.linspace(ends[0], ends[1], 2 * intervals + 1)  # nodes, with the middles between them
     turns = 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
     psi = 2.0 * np.arctan(np.tan(0.5 * (angle - turns)) / stretch) + turns + towards
     h = (1.0 - a * np.cos(psi) - b * np.sin(psi)) ** 3
