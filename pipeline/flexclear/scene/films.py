@@ -72,3 +72,15 @@ class Squeeze:
         """Frames of the outer and the inner surface."""
         outer, inner = self.gap.between
         return outer, inner
+
+
+def films_of(scene: Any) -> dict[str, Squeeze]:
+    """Return the films of a scene's joints by the joint's name."""
+    filled = {n: j for n, j in scene.joint.items() if getattr(j, "film", None) is not None}
+    return {name: Squeeze(joint, f"joint.{name}.film") for name, joint in filled.items()}
+
+
+def actions_of(scene: Any) -> dict[str, Any]:
+    """Return what acts in a scene as a load does, by name: loads other than gravity, and films as ``A.film``."""
+    forces: dict[str, Any] = scene.forces()
+    return forces | {f"{name}.film": film for name, film in films_of(scene).items()}

@@ -9,7 +9,6 @@ from flexclear.scene import provenance
 from flexclear.scene.drives import Drive
 from flexclear.scene.events import Event, require_possible
 from flexclear.scene.fields import Direction, Length, Number, Part, PartName, Positive, Time
-from flexclear.scene.films import Squeeze
 from flexclear.scene.formulas import check_formulas
 from flexclear.scene.limits import Limits, check_members, check_rows
 from flexclear.scene.loads import Gravity, Load, SampledPid
@@ -440,15 +439,6 @@ class Scene(Part):
     def forces(self) -> dict[str, Any]:
         """Return the loads other than gravity, which is a field, by name."""
         return {n: load for n, load in self.load.items() if not isinstance(load, Gravity)}
-
-    def films(self) -> dict[str, Squeeze]:
-        """Return the films of joints by the joint's name."""
-        filled = {n: j for n, j in self.joint.items() if getattr(j, "film", None) is not None}
-        return {name: Squeeze(joint, f"joint.{name}.film") for name, joint in filled.items()}
-
-    def actions(self) -> dict[str, Any]:
-        """Return what acts as a load does, by name: loads other than gravity, and films as ``A.film``."""
-        return self.forces() | {f"{name}.film": film for name, film in self.films().items()}
 
     def sources(self) -> dict[str, str]:
         """Return the provenance of each value: ``part.key`` (or ``part``) -> text."""

@@ -15,6 +15,7 @@ from flexclear.dynamics.effects.declared import EFFECTS
 from flexclear.dynamics.effects.effect import Effect
 from flexclear.scene import integrators
 from flexclear.scene.drives import PathDrive
+from flexclear.scene.films import actions_of
 
 if TYPE_CHECKING:
     from flexclear.scene.schema import Scene
@@ -90,7 +91,7 @@ def most_parts(scene: Scene) -> Parts:
         surfaces=tuple(sorted({pair.contact.type for pair in scene.pairs().values()})),
         forms=(*FORMS, *_own_forms(scene)) if _touches(scene) else (),
         frictions=tuple(sorted({j.friction.kind for j in contacts.values() if j.friction is not None})),
-        loads=tuple(sorted({load_kind(scene, name) for name in scene.actions()})),
+        loads=tuple(sorted({load_kind(scene, name) for name in actions_of(scene)})),
         effects=tuple(sorted(" ".join([name, *known]) for name, known in kinds.items() if known is not None)),
         closures=_loops(scene),
         flexible=bool(scene.flexible()),
@@ -135,7 +136,7 @@ def load_kind(scene: Scene, name: str) -> str:
     of an expression."""
     from flexclear.scene.formulas import formula
 
-    load, written = scene.actions()[name], formula(scene, name)
+    load, written = actions_of(scene)[name], formula(scene, name)
     structure = written.code if written else getattr(load, "kind", "")
     return f"{load.type} {structure}".strip()
 
