@@ -69,6 +69,15 @@ def _slider_crank(run: xr.Dataset, scene: Scene) -> str:
     )
 
 
+def _bearing(run: xr.Dataset, scene: Scene) -> str:
+    x, y, _ = run["contact_offset"].sel(contact="bearing").values[-1]
+    thickness, torque = (run[f"film_{key}"].sel(film="bearing").values[-1] for key in ("thickness", "moment"))
+    return (
+        f"{1e3 * np.hypot(x, y):.2f} mm from the middle, {np.degrees(np.arctan2(x, -y)):.0f}° ahead of the load; the "
+        f"film is {1e3 * thickness:.2f} mm thick there and brakes the shaft with {-1e3 * torque[2]:.0f} N mm."
+    )
+
+
 def _slider(run: xr.Dataset, scene: Scene) -> str:
     post = derive(run)
     tilt = 2e3 * np.abs(run["quaternion"].sel(body="slider").values[:, 3]).max()
@@ -290,6 +299,7 @@ ENTRIES = {
         Entry("gallery/backlash", "How much of a swing does the backlash of a gear pair take?", _backlash),
         Entry("checks/scotch_yoke", "How often does a loose pin hit its slot?", _yoke),
         Entry("gallery/loose_slider", "How does a slider hit its guide that is 1 mm too wide on each side?", _slider),
+        Entry("gallery/journal_bearing", "Where does a turning shaft come to rest in its oil?", _bearing, at=1.0),
         Entry("checks/ball_on_plane", "How often does a ball bounce in half a second?", _balls),
         Entry("gallery/rolling_ball", "How far does a ball roll down a slope in a second?", _rolling, at=1.0),
         Entry("checks/bushing", "How far does a block move on its rubber mount?", _bushing),

@@ -29,6 +29,7 @@ SI = {
     "stiffness": "N/m",
     "damping": "N s/m",
     "pressure": "Pa",
+    "viscosity": "Pa s",
     "density": "kg/m^3",
     "area": "m^2",
     "second moment of area": "m^4",

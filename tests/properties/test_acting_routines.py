@@ -113,6 +113,9 @@ def table(number: int) -> Table:
             joint["friction"] = {"law": friction} | FRICTION[friction]
         if (number + k) % 3 == 0 and "slot" not in joint["type"] and "plane" not in joint["type"]:
             joint["wear"] = {"coefficient": 1e-4, "hardness": 1e9}
+        if (number + k) % 2 == 0 and joint["type"] in ("clearance-revolute", "clearance-spherical"):
+            # forces of thin films take the fifth power of the rounding of an eccentricity of 1
+            joint["film"] = {"viscosity": 0.1, "roughness": 0.3 * joint["clearance"]}
     single = [name for name, one in made["joint"].items() if one["type"] in ("revolute", "prismatic")]
     law = list(NORMAL)[number % len(NORMAL)]
     stop = {"joint": single[0], "lower": -0.4, "upper": 0.5, "normal": {"law": law, "stiffness": 1e5} | NORMAL[law]}
@@ -172,7 +175,7 @@ def test_every_surface_law_and_load_is_tried() -> None:
     assert set().union(*(model.parts.frictions for model in models)) == set(FRICTION_LAWS)
     assert {contact.joint.normal.law for model in models for contact in model.contacts} == set(NORMAL)
     effects = {one.name for model in models for one in model.parts.present}
-    assert effects == {"bushings", "controllers", "gears", "stops", "wear"}
+    assert effects == {"bushings", "controllers", "films", "gears", "stops", "wear"}
     kinds = {load.partition(" ")[0] for model in models for load in model.parts.loads}
     assert kinds == set(kinds_of_loads.LOADS)
 

@@ -105,8 +105,8 @@ def run() -> xr.Dataset:
 
 
 def test_every_load_is_tried_here() -> None:
-    # those by expressions: tests/analytic/test_expressions.py
-    elsewhere = {"gravity", "joint-expression", "line-expression", "point-expression"}
+    # those by expressions: tests/analytic/test_expressions.py; films: tests/analytic/test_films.py
+    elsewhere = {"gravity", "film", "joint-expression", "line-expression", "point-expression"}
     assert {part["type"] for part in LOADS.values()} == set(loads.LOADS) - elsewhere
 
 

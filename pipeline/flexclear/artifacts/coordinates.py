@@ -52,6 +52,7 @@ load? | load | | name of the load
 load_type? | load | | type of the load
 load_motion? | load | | translation or rotation: kind of the load's length
 bushing? | bushing | | name of the bushing
+film? | film | | name of the joint with a film
 controller? | controller | | name of the controller
 controller_motion? | controller | | {_MOTION}
 gear? | gear | | name of the gear

@@ -80,7 +80,7 @@ def formula(scene: Any, name: str) -> Formula | None:
 
     Raises ValueError, in words, for an expression that cannot be computed or has another unit than the load.
     """
-    load = scene.load[name]
+    load = scene.load.get(name)
     if not isinstance(load, EXPRESSIONS):
         return None
     dimension = "torque" if isinstance(load, JointExpression) and is_angle(scene, load) else "force"

@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 
 from flexclear.scene.clearance import Friction, Material, NormalLaw, Wear
 from flexclear.scene.fields import FrameName, Length, Part, Positive, Speed
-from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Seat, Station, facing
+from flexclear.scene.films import Film, JournalFilm
+from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Rough, Seat, Station, facing
 
 #: approach speed of a contact
 Rate = Annotated[Speed, Field(ge=0.0)]
@@ -105,6 +106,21 @@ class _Worn(_Clearance):
 
     wear: Wear | None = None
     """wear of both surfaces; default: none"""
+    film: Film | None = None
+    """film of a liquid between the surfaces; default: none"""
+
+    @model_validator(mode="after")
+    def _film_fitting(self) -> Self:
+        if self.film is not None:
+            self.film.height(self.clearance)
+        return self
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """The two surfaces; with a film they touch where it is as thin as their roughness."""
+        if self.film is None:
+            return super().pairs
+        return {"": Pair(Rough(self, "", self.clearance - self.film.height(self.clearance)))}
 
 
 class Pin(_Clearance):
@@ -168,6 +184,8 @@ class ClearanceRevolute(_Tilting, _Worn):
 
     ideal, across = "revolute", (0, 1)
     type: Literal["clearance-revolute"]
+    film: JournalFilm | None = None
+    """film of a liquid between pin and journal; default: none"""
     axial_clearance: Annotated[Length, Positive] | None = None
     """gap between either end of the journal and the pin's collar there; the pin then tilts within its clearance, and
     nothing is held but by contacts at both ends and the collars"""
@@ -197,8 +215,9 @@ class ClearanceRevolute(_Tilting, _Worn):
                     f"collar_radius = {self.collar_radius:g} m must be more than the journal's radius, "
                     f"{self.pin_radius + self.clearance:g} m: the face touches the end of the journal around its hole"
                 )
-        if self.axial_clearance is not None and self.wear is not None:
-            raise ValueError("the wear of a pin that tilts is not computed; leave out wear or axial_clearance")
+        given = next((key for key in ("wear", "film") if getattr(self, key) is not None), "")
+        if self.axial_clearance is not None and given:
+            raise ValueError(f"the {given} of a pin that tilts is not computed; leave out {given} or axial_clearance")
         return self
 
     @property

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from flexclear.scene.drives import PathDrive
+from flexclear.scene.films import actions_of, films_of
 from flexclear.scene.loads import Bushing, Pid, SampledPid
 from flexclear.scene.parts import Ground
 from flexclear.scene.quantity import KINDS
@@ -45,6 +46,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         "gear": {name: _is_angle(scene, gear.second) for name, gear in scene.gear.items()},
         "load": {name: _measures_angle(scene, load) for name, load in forces.items()},
         "bushing": _still(name for name, load in forces.items() if isinstance(load, Bushing)),
+        "film": _still(films_of(scene)),
         "contact": _still(contacts) | stops,
         "rubbing": _still(scene.joints_with_friction()),
         "worn": _still(scene.wearing_joints()),
@@ -61,7 +63,7 @@ def _still(names: Any) -> dict[str, bool]:
 
 def _names_of_all(scene: Any) -> Iterator[str]:
     for key, kind in KINDS.items():
-        possible = (key not in _OF_LOADS or scene.forces()) and (key not in _OF_MODES or scene.flexible())
+        possible = (key not in _OF_LOADS or actions_of(scene)) and (key not in _OF_MODES or scene.flexible())
         if kind.owner == "" and kind.variable and possible:
             yield key
 

@@ -67,6 +67,10 @@ class Feature:
         return float(self.radius)
 
 
+class Rough(Feature):
+    """The one contact of a joint with a film: rough surfaces, whose gap ends before the clearance does."""
+
+
 @dataclass(frozen=True)
 class Corner(Feature):
     """Corner of one part of a sliding joint above a face of the other.

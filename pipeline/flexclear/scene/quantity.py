@@ -35,6 +35,7 @@ OWNERS = {
     "load": "load",
     "bushing": "bushing",
     "contact": "joint with clearance, or end of a stop or of teeth with backlash",
+    "film": "joint with a film",
     "rubbing": "joint with friction",
     "worn": "joint with wear",
     "mode": "mode, `body.number`",
@@ -53,7 +54,7 @@ _INDICATORS = ("mobility", "rank", "condition")
 #: quantities that contacts have once per run or event, not over time
 OF_CONTACTS = ("peak_force", "impulse", "impact_times")
 #: owners that a scene without clearance does not have
-OF_CLEARANCE = ("contact", "worn")
+OF_CLEARANCE = ("contact", "worn", "film")
 EXPRESSION = "expression"
 COMPONENTS = ("x", "y", "z")
 

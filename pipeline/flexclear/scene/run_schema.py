@@ -34,6 +34,10 @@ load_moment? | time load axis | N m | moment of the load on the frame, about the
 load_length? | time load | m, rad | length of a spring, or joint coordinate that a load acts along
 bushing_displacement? | time bushing axis | m | second frame's origin in the first one's axes
 bushing_rotation? | time bushing axis | rad | rotation vector from the first frame to the second
+film_force? | time film axis | N | film's part of joint_force, world axes
+film_moment? | time film axis | N m | film's part of joint_moment, world axes
+film_power? | time film | W | power of the film on the mechanism, <= 0
+film_thickness? | time film | m | clearance minus eccentricity
 load_power? | time load | W | power of the load on the mechanism, stored energy included
 controller_force? | time controller | N, N m | force of the controller along the coordinate it pushes
 controller_integral? | time controller | N, N m | integral part of that force

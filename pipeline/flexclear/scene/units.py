@@ -53,6 +53,7 @@ _DIMENSIONS: dict[str, tuple[Exponents, dict[str, float]]] = {
     "impulse": ((1, 1, -1, 0), {"N s": 1.0}),
     "angular impulse": ((1, 2, -1, 0), {"N m s": 1.0}),
     "pressure": ((1, -1, -2, 0), {"Pa": 1.0, "kPa": 1e3, "bar": 1e5, "MPa": 1e6, "GPa": 1e9}),
+    "viscosity": ((1, -1, -1, 0), {"Pa s": 1.0, "mPa s": 1e-3}),
     "angular velocity": (
         (0, 0, -1, 1),
         {

@@ -83,8 +83,9 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
         removable = name in replaceable_contacts(scene)
         if removable:
             listed.append(Effect(f"joint.{name}.clearance", CLEARANCE))
-        if joint.friction is not None:
-            listed.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if removable else ""))
+        for key in ("friction", "film"):
+            if getattr(joint, key, None) is not None:
+                listed.append(Effect(f"joint.{name}.{key}", key, f"joint.{name}.clearance" if removable else ""))
     listed += [Effect(f"joint.{name}.friction", "friction") for name in scene.joints_with_friction()]
     for name, load in scene.load.items():
         if load.type in OF_THE_WORLD:

@@ -15,6 +15,7 @@ from flexclear.dynamics.effects.declared import EFFECTS
 from flexclear.dynamics.effects.effect import Effect
 from flexclear.scene import integrators
 from flexclear.scene.drives import PathDrive
+from flexclear.scene.films import actions_of
 
 if TYPE_CHECKING:
     from flexclear.scene.schema import Scene
@@ -32,7 +33,7 @@ WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "pi
 class Parts:
     """Kinds of parts of a mechanism, each sorted by name: all that the code of its equations depends on.
 
-    surfaces, forms, frictions: of contacts.  loads: their types, with the structure of expressions.
+    surfaces, forms, frictions: of contacts.  loads: their kinds (`load_kind`).
     effects: names, each followed by the kinds of which its code is composed.  harmonics: True when a law of time has
     some.  load_kinks: True when loads have kinks.
     """
@@ -90,7 +91,7 @@ def most_parts(scene: Scene) -> Parts:
         surfaces=tuple(sorted({pair.contact.type for pair in scene.pairs().values()})),
         forms=(*FORMS, *_own_forms(scene)) if _touches(scene) else (),
         frictions=tuple(sorted({j.friction.kind for j in contacts.values() if j.friction is not None})),
-        loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),
+        loads=tuple(sorted({load_kind(scene, name) for name in actions_of(scene)})),
         effects=tuple(sorted(" ".join([name, *known]) for name, known in kinds.items() if known is not None)),
         closures=_loops(scene),
         flexible=bool(scene.flexible()),
@@ -131,11 +132,13 @@ def _loops(scene: Scene) -> bool:
 
 
 def load_kind(scene: Scene, name: str) -> str:
-    """Return the kind of a load by which its code is composed: its type, with the structure of its expression."""
+    """Return the kind of a load by which its code is composed: its type, with a film's model or the structure
+    of an expression."""
     from flexclear.scene.formulas import formula
 
-    written = formula(scene, name)
-    return f"{scene.forces()[name].type} {written.code}" if written else str(scene.forces()[name].type)
+    load, written = actions_of(scene)[name], formula(scene, name)
+    structure = written.code if written else getattr(load, "kind", "")
+    return f"{load.type} {structure}".strip()
 
 
 def _laws(scene: Scene) -> set[str]:

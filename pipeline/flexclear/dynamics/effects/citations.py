@@ -10,6 +10,7 @@ from pathlib import Path
 from flexclear.artifacts.paths import PACKAGE
 from flexclear.dynamics.effects import most_parts, schemes
 from flexclear.dynamics.effects.declared import EFFECTS
+from flexclear.scene.films import films_of
 from flexclear.scene.integrators import INTEGRATORS
 from flexclear.scene.provenance import cited_sources
 from flexclear.scene.schema import Scene
@@ -55,7 +56,8 @@ def sources(path: Path) -> tuple[str, ...]:
 def _named(scene: Scene) -> set[str]:
     """Return the names of the modules of the parts that a scene names."""
     values = flatten(scene.model_dump(mode="json", exclude_none=True))
-    return {text.strip('"').replace("-", "_") for key, text in values if key.rpartition(".")[2] in NAMING}
+    films = {film.type for film in films_of(scene).values()}
+    return films | {text.strip('"').replace("-", "_") for key, text in values if key.rpartition(".")[2] in NAMING}
 
 
 class Uses:

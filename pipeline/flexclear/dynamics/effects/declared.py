@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from flexclear.dynamics.effects.effect import Effect
+from flexclear.scene.films import films_of
 
 if TYPE_CHECKING:
     from flexclear.scene.schema import Scene
@@ -23,6 +24,10 @@ CONTROLLERS = Effect(
     lambda scene: () if any(load.type in TYPES for load in scene.load.values()) else None,
     changeable=tuple(f"load.{key}" for key in NUMBERS),
 )
+
+
+#: the force of a film is a load
+FILMS = Effect("films", lambda scene: () if films_of(scene) else None)
 
 
 GEARS = Effect(
@@ -104,4 +109,4 @@ WEAR = Effect(
 )
 
 #: in the order of their blocks in the ledger; to add one: its declaration above, and its name here
-EFFECTS = (STIFFENING, STOPS, GEARS, BUSHINGS, CONTROLLERS, JOINT_FRICTION, WEAR)
+EFFECTS = (STIFFENING, STOPS, GEARS, BUSHINGS, CONTROLLERS, FILMS, JOINT_FRICTION, WEAR)

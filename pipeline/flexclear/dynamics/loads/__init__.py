@@ -1,10 +1,11 @@
-"""Loads. To add one: a module here, a line in the table, and its parameters in scene/loads.
+"""Loads. To add one: a module here, a line in the table, and its parameters in scene/loads; a film is declared in
+its joint (scene/films).
 
 Each module has
 
 - ``row(load, place)`` or, on a joint coordinate, ``row(load, place, coordinate)``: the row of the load (see `row.Row`);
   raises ValueError, in words, for invalid values;
-- ``apply(given)``, and for loads with expressions ``apply(given, formula)``: what the load does (`given`);
+- ``apply(given)``, and for loads of several structures ``apply(given, structure)``: what the load does (`given`);
 - ``STATES``, if it has internal states: their number.
 """
 
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 from flexclear.dynamics.loads import (
     bushing,
+    film,
     joint_expression,
     joint_force,
     joint_friction,
@@ -36,6 +38,7 @@ LOADS = {
     "joint-spring": joint_spring,
     "joint-friction": joint_friction,
     "bushing": bushing,
+    "film": film,
     "pid": pid,
     "sampled-pid": sampled_pid,
 }

@@ -13,6 +13,7 @@ from flexclear.dynamics.loads import LOADS
 from flexclear.dynamics.model.driving import coordinate_of, joint_type, named_coordinate
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.stops import End
+from flexclear.scene.films import actions_of
 from flexclear.scene.formulas import formula
 from flexclear.scene.schema import Scene
 
@@ -79,7 +80,7 @@ def recorded_states(model: Model, y: np.ndarray) -> np.ndarray:
 
 def _coordinates(scene: Scene, name: str) -> list[tuple[str, Coordinate] | None]:
     """Return joint and coordinate along which a load acts, and those that it measures."""
-    load: Any = scene.load[name]
+    load: Any = actions_of(scene)[name]
     if not hasattr(load, "joint"):
         return [None, None]
     joint, _, coordinate = coordinate_of(scene, load.joint, load.coordinate, "")
@@ -90,6 +91,6 @@ def _coordinates(scene: Scene, name: str) -> list[tuple[str, Coordinate] | None]
 
 def _states(scene: Scene, name: str) -> int:
     """Return the number of internal states of a load, without turns."""
-    load: Any = scene.load[name]
+    load: Any = actions_of(scene)[name]
     given = [one[1] for one in _coordinates(scene, name) if one is not None]
     return int(LOADS[load.type].row(load, "", *given).states)

@@ -22,6 +22,7 @@ from flexclear.dynamics.model.laws import NO_LAWS, checked_law
 from flexclear.dynamics.model.mechanism import Mechanism, Site
 from flexclear.dynamics.model.merge import Placement, find_frame
 from flexclear.dynamics.model.numbering import Numbering
+from flexclear.scene.films import actions_of
 from flexclear.scene.formulas import formula
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError, all_or_errors
@@ -62,7 +63,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
 
     gauges: receives those of the loads and their internal states.
     """
-    scene, forces = mechanism.scene, mechanism.scene.forces()
+    scene, forces = mechanism.scene, actions_of(mechanism.scene)
     kind_of = {name: load_kind(scene, name) for name in forces}
     names = sorted(forces, key=kind_of.__getitem__)  # stable: the scene's order within a kind
     kinds = tuple(sorted(set(kind_of.values())))
@@ -120,8 +121,8 @@ class Description(NamedTuple):
 
 def describe(scene: Scene, name: str, given: Mapping[str, Pieces] = NO_LAWS) -> Description:
     """Return the description of a load; raise InputError for one that cannot exist.  given: as in `model.tabulate`."""
-    load: Any = scene.load[name]
-    path = f"[load.{name}]"
+    load: Any = actions_of(scene)[name]
+    path = f"[{getattr(load, 'place', f'load.{name}')}]"
     part = LOADS[load.type]
     coordinate: Coordinate | None = None
     measured: tuple[str, Coordinate] | None = None

@@ -23,6 +23,7 @@ from flexclear.dynamics.model.loads import Load
 from flexclear.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
 from flexclear.dynamics.model.numbering import Numbering, number
 from flexclear.dynamics.model.stops import End
+from flexclear.scene.films import actions_of
 from flexclear.scene.schema import Scene
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ class Model:
     def rows_of(self, *kinds: type) -> dict[str, np.ndarray]:
         """Return the rows of the table LOADS of all loads of the given types, by name, in the order of the scene."""
         rows = {name: row for (name, _), row in zip(self.loads, self.arrays.table(m.LOADS), strict=True)}
-        return {name: rows[name] for name, load in self.scene.forces().items() if isinstance(load, kinds)}
+        return {name: rows[name] for name, load in actions_of(self.scene).items() if isinstance(load, kinds)}
 
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NO_LAWS) -> Model:

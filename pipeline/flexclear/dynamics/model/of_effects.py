@@ -14,6 +14,7 @@ from flexclear.dynamics.model.components import Floors, Group
 from flexclear.dynamics.model.filling import Filling
 from flexclear.dynamics.model.guards import Guard
 from flexclear.dynamics.model.mechanism import Mechanism
+from flexclear.scene.films import actions_of
 
 #: rows of an effect's tables by name, from a `Filling`
 FILLS = {
@@ -41,7 +42,7 @@ def blocks(mechanism: Mechanism, parts: Parts, energies: Floors, lengths: Floors
     return {
         "mechanism": of_the_first * m.CONTACT_SLOTS,
         **contacts.ledger(mechanism, energies, lengths),
-        "loads": of_the_first * (LOADS if mechanism.scene.forces() else 0),
+        "loads": of_the_first * (LOADS if actions_of(mechanism.scene) else 0),
         **{name: LEDGERS[name](mechanism, energies, lengths) for name in effects},
         "books": [(float(energy), OTHER_BOOKS, part) for part, energy in enumerate(energies) if part],
     }

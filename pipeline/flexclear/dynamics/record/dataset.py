@@ -19,7 +19,7 @@ from flexclear.dynamics.model.internal_states import named_states
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import doubts
 from flexclear.dynamics.model.stops import ends_an_angle
-from flexclear.dynamics.record import bushings, controllers, frame_loads, gears, joint_friction, stress, wear
+from flexclear.dynamics.record import bushings, controllers, films, frame_loads, gears, joint_friction, stress, wear
 from flexclear.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.dynamics.record.topology import topology
 from flexclear.dynamics.record.wrenches import every_joint_wrench, held_moments
@@ -88,6 +88,7 @@ def series(scene: Scene, motions: Motions, requested: Collection[Quantity], time
 RECORDS = {
     "gears": (("gear_",), gears.gear_series),
     "bushings": (("bushing_",), bushings.bushing_series),
+    "films": (("film_",), films.film_series),
     "controllers": (("controller_",), controllers.controller_series),
     "joint_friction": (("joint_bearing", "joint_sliding", "joint_friction_"), joint_friction.friction_series),
     "wear": (("wear_",), wear.wear_series),
@@ -110,7 +111,7 @@ def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], C
     yield ("modal_",), lambda: _modes(motions)
     yield ("drive_force", "drive_position"), lambda: _drives(scene, model, seen)
     yield ("joint_position", "joint_velocity", "joint_acceleration"), lambda: _joint_coordinates(model, seen)
-    if model.loads:
+    if scene.forces():
         yield ("load_",), lambda: _loads(model, seen)
     for effect in model.parts.present:
         if effect.name in RECORDS:

@@ -11,6 +11,13 @@ from flexclear.dynamics.model.model import Model
 
 def load_series(model: Model, seen: Observed) -> Variables:
     """Return forces and moments on the (second) frame, lengths and powers, with loads in the order of the scene."""
+    values = acting(model, seen, list(model.scene.forces()))
+    dims = {"force": ("time", "load", "axis"), "moment": ("time", "load", "axis")}
+    return {f"load_{name}": (dims.get(name, ("time", "load")), one) for name, one in values.items()}
+
+
+def acting(model: Model, seen: Observed, names: list[str]) -> dict[str, np.ndarray]:
+    """Return force, moment, length and power of loads and films, (time, names) or (time, names, 3) each."""
     force, moment = seen.loads["force"], seen.loads["moment"]
     topology = model.arrays.table(m.LOADS)
     power = np.zeros(seen.loads.shape)
@@ -19,16 +26,11 @@ def load_series(model: Model, seen: Observed) -> Variables:
         site = seen.sites[:, topology[end][held]]
         at_origin = site["velocity"] - np.cross(site["omega"], site["origin"])
         power[:, held] += sign * np.sum(site["omega"] * moment[:, held] + at_origin * force[:, held], axis=-1)
-    origin = seen.sites[:, topology["b"]]["origin"]
-    names = [name for name, _ in model.loads]
-    shown = [names.index(name) for name in model.scene.forces()]
-    series = {
-        "load_force": (("time", "load", "axis"), force),
-        "load_moment": (("time", "load", "axis"), moment - np.cross(origin, force)),
-        "load_length": (("time", "load"), seen.loads["value"]),
-        "load_power": (("time", "load"), power),
-    }
-    return {name: (dims, values[:, shown]) for name, (dims, values) in series.items()}
+    about = moment - np.cross(seen.sites[:, topology["b"]]["origin"], force)
+    every = [name for name, _ in model.loads]
+    shown = [every.index(name) for name in names]
+    whole = {"force": force, "moment": about, "length": seen.loads["value"], "power": power}
+    return {name: values[:, shown] for name, values in whole.items()}
 
 
 def along_coordinates(model: Model, seen: Observed, names: list[str]) -> np.ndarray:

@@ -44,6 +44,11 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
         known[owner] = (moment + cross(seen.touch["point"][:, c], push), force + push)
     if any(name not in known for name in names):
         known |= _inside_groups(motions, known)
+    for k, (name, _) in enumerate(model.loads):
+        owner = name.removesuffix(".film")
+        if owner != name:
+            moment, force = known[owner]
+            known[owner] = (moment + seen.loads["moment"][:, k], force + seen.loads["force"][:, k])
     moments, forces = (np.empty((len(seen.state), len(names), 3)) for _ in range(2))
     for k, name in enumerate(names):
         moments[:, k], forces[:, k] = known[name]

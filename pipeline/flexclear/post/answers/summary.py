@@ -91,6 +91,7 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
         "clearance": loose,
         "contact friction": [f"{n} ({joint[n]['friction']['law']})" for n in loose if joint[n].get("friction")],
         "wear": [n for n in loose if joint[n].get("wear")],
+        "films of oil": [n for n in loose if joint[n].get("film")],
         "flexible bodies": [f"{n} ({body[n]['modes']['reference']})" for n in flexible],
         "damping of flexible bodies": [n for n in flexible if body[n].get("damping") is not None],
         "geometric stiffening": [n for n in flexible if body[n].get("stiffening") is not None],
