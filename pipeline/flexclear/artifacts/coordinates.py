@@ -57,6 +57,7 @@ event_motion? | event | | rotation for an event along an angle, else translation
 contact_motion? | contact | | rotation for a contact that limits an angle, else translation
 rubbing? | rubbing | | name of the ideal joint with friction
 worn? | worn | | name of the contact that wears
+step? | step | 1 | number of the step of wear, from 0
 band? | band | 1 | number of the band of equal height on a sphere, from its lower pole on
 sector? | sector | 1 | number of the sector about z of the surface's frame, from x on
 pass_joint? | singular_pass | | joint on whose coordinate the branches differ most

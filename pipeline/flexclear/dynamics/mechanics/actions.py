@@ -34,7 +34,8 @@ def actions_of(tables: Tables, ground: Carrier, frames: list[Frame]) -> list[Act
 def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
     """Return contacts and stops, with the places of what steps read of them and of their books."""
     parts, slot, made = tables.parts, tables.nq + tables.nv, list[Action]()
-    worn = tables.table(m.NAMED["worn"])["contact"].tolist()
+    wearing = tables.table(m.NAMED["worn"])
+    worn = wearing["contact"].tolist()
     wear0 = slot + tables.size(m.SIZES["wear_slot"])
     for c, row in enumerate(tables.table(m.CONTACTS)):
         numbers, closed, latched = (
@@ -46,17 +47,28 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
         results, form = [*tables.row(m.NAMED["touch"], c), *books], parts.forms[row["normal"]]
         given: tuple[Any, ...]
         if c < tables.size(m.N_SURFACES):
+            profile: tuple[Any, ...] = ()
             if c in worn:
+                profile = _profile(tables, wearing[worn.index(c)])
                 results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)
             bristle, rates = (cells(array, int(row["bristle"]), 3 * (row["bristle"] >= 0)) for array in (STATE, RATES))
             laws = form, parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
-            given = parts.surfaces[row["surfaces"]], laws, int(c in worn), numbers, closed, latched, bristle
+            given = parts.surfaces[row["surfaces"]], laws, int(c in worn), profile, numbers, closed, latched, bristle
         else:
             gauge, turns, rates = _gauge(tables, row["surfaces"])
             given = form, gauge, numbers, closed, latched, turns
         ends = [frames[row["outer"]], frames[row["inner"]]]
-        made.append(Action(touch if len(given) == 7 else stop, given, ends, [*results, *rates]))
+        made.append(Action(touch if c < tables.size(m.N_SURFACES) else stop, given, ends, [*results, *rates]))
     return made
+
+
+def _profile(tables: Tables, row: Any) -> tuple[Any, ...]:
+    """Return halvings and numbers of the profiles of both surfaces of a contact; () for round ones."""
+    if row["halvings"] < 0:
+        return ()
+    halvings = int(row["halvings"]), *([int(row["heights"])] * bool(row["heights"]))
+    firsts = (tables.row(m.NAMED["profiles"], row[side])[0].index for side in ("outer0", "inner0"))
+    return halvings, *(Span(SCENE, first) for first in firsts)
 
 
 def _gauge(tables: Tables, k: int) -> tuple[Any, list[Cell], list[Cell]]:
