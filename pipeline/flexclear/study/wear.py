@@ -80,8 +80,7 @@ class Study:
             if not step:
                 step = self.tolerance / deep if deep else left
             step = min(max(min(step, DEEPEST / deep if deep else left), self.per_run), left)
-            change = self._extrapolated(step)
-            depths = {name: np.maximum(now.depths[name], now.depths[name] + change[name]) for name in change}
+            depths = self._extrapolated(step)
             reached = cycles if step == left else now.cycles + step
             after = self._evaluated(reached, depths)
             mean = {name: 0.5 * step * (now.rates[name] + after.rates[name]) for name in depths}
@@ -91,13 +90,16 @@ class Study:
             step *= min(max(SAFE * (self.tolerance / error) ** 0.5 if error else MOST, LEAST), MOST)
 
     def _extrapolated(self, step: float) -> dict[str, np.ndarray]:
-        """Return the change of the depths over a step of cycles."""
-        now = self.steps[-1]
-        if len(self.steps) < 2:
-            return {name: step * rate for name, rate in now.rates.items()}
-        before = self.steps[-2]
-        bend = 0.5 * step / (now.cycles - before.cycles)
-        return {name: step * ((1.0 + bend) * rate - bend * before.rates[name]) for name, rate in now.rates.items()}
+        """Return the depths after a step of cycles, which are nowhere less than before."""
+        now, before = self.steps[-1], self.steps[-2] if len(self.steps) > 1 else None
+        depths = dict[str, np.ndarray]()
+        for name, rate in now.rates.items():
+            falling = before.rates[name] - rate if before else np.zeros_like(rate)
+            bend = 0.5 * step / (now.cycles - before.cycles) if before else 0.0
+            # the same factor everywhere: it keeps the volume
+            least = np.min(rate[falling > 0.0] / falling[falling > 0.0], initial=np.inf)
+            depths[name] = now.depths[name] + step * (rate - min(bend, least) * falling)
+        return depths
 
     def _fraction(self, depths: dict[str, np.ndarray]) -> float:
         """Return the largest of depths, as fraction of the joint's clearance."""
@@ -105,7 +107,8 @@ class Study:
 
     def _evaluated(self, cycles: float, depths: dict[str, np.ndarray]) -> Wearing:
         """Return the state with these depths, whose run is brought up to date."""
-        graph = Graph(edited(self.scene, worn_edits(self.joints, depths)), shown=False)
+        edits = {**worn_edits(self.joints, depths), "output.horizon": False}
+        graph = Graph(edited(self.scene, edits), shown=False)
         (data,) = self.workplace.datasets(graph.simulate)
         run = of(data)
         worn = [str(name) for name in run["worn"].values]
