@@ -425,9 +425,8 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
         start["from"] = str(start["from"] if Path(start["from"]).is_absolute() else absolute(start["from"]))
     for joint in table.get("joint", {}).values():
         wear = joint.get("wear") if isinstance(joint, dict) else None
-        profile = wear.get("profile") if isinstance(wear, dict) and not wear.get("shapes") else None
-        if isinstance(profile, str) and not Path(profile).is_absolute():
-            wear["profile"] = absolute(profile)
+        if isinstance(wear, dict) and isinstance(wear.get("profile"), str) and not wear.get("shapes"):
+            wear["profile"] = str(wear["profile"] if Path(wear["profile"]).is_absolute() else absolute(wear["profile"]))
     for law in _tables([table.get(family) for family in ("drive", "load", "event")]):
         if not Path(law["file"]).is_absolute():
             law["file"] = absolute(law["file"])
