@@ -112,7 +112,7 @@ component? | component | 1 | direction of the motion, by variance, from 0
 #: dimensions whose entries are named by numbers only, and the number of the first entry
 NUMBERED = {
     **dict.fromkeys(("node", "cell", "corner", "around", "point", "lump", "section", "slice", "station", "fibre"), 0),
-    **dict.fromkeys(("followed", "lag", "component", "band", "sector"), 0),
+    **dict.fromkeys(("followed", "lag", "component", "step", "band", "sector"), 0),
     **dict.fromkeys(("mode", "mode2", "rigid_mode"), 1),
 }
 #: dimensions whose entries are always the same

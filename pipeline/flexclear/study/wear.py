@@ -217,19 +217,19 @@ def depths_of_run(run: LabelledArrays, k: int, joint: Any, depths: np.ndarray) -
 def arcs(work: np.ndarray, depths: np.ndarray, clearance: float, penetration: float) -> np.ndarray:
     """Return work by band and sector [N m], of work in finer directions, spread over where the surfaces overlap.
 
-    depths: by band and sector of one surface [m].  penetration: typical one [m].  In each direction the overlap is
-    e cos(angle) - clearance - depth, for the distance e of the centres at this penetration.
+    depths: by band and sector of one surface [m].  penetration: typical one [m].  The surfaces overlap by
+    e cos(angle) - clearance - depth, where the distance e of the centres is that of this penetration at the mean depth
+    of the cells around the direction.
     """
     cells, fine = directions(*depths.shape), directions(*work.shape)
     loaded = np.flatnonzero(work)
-    cosines = cells @ fine[loaded].T
+    cosines, narrow = cells @ fine[loaded].T, np.cos(2.0 * np.pi / depths.shape[1])
+    # bands of a sphere are wider than its sectors near the poles: then the nearest cell alone is around
+    around = np.maximum(0.0, cosines - np.minimum(narrow, cosines.max(axis=0) - 1e-9))
     gap = clearance + depths.ravel()
-    nearest = gap[cosines.argmax(axis=0)]
-    narrow = nearest * (1.0 / np.cos(2.0 * np.pi / depths.shape[1]) - 1.0)
-    overlap = np.maximum(0.0, (nearest + np.maximum(penetration, narrow)) * cosines - gap[:, None])
-    # bands of a sphere are wider than its sectors near the poles: then the nearest cell has all
-    alone = ~overlap.any(axis=0)
-    overlap[cosines.argmax(axis=0)[alone], np.flatnonzero(alone)] = 1.0
+    mean = gap @ around / around.sum(axis=0)
+    overlap = np.maximum(0.0, (mean + np.maximum(penetration, mean * (1.0 / narrow - 1.0))) * cosines - gap[:, None])
+    overlap = np.where(overlap.any(axis=0), overlap, around)
     spread: np.ndarray = overlap / overlap.sum(axis=0) @ work.ravel()[loaded]
     return spread.reshape(depths.shape)
 
