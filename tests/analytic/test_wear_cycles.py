@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,15 @@ import xarray as xr
 from scipy.optimize import brentq
 
 import flexclear as fc
+from flexclear import dynamics
+from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
 from flexclear.stages.workplace import Workplace, open_workplace
 from flexclear.study.wear import Study, Wearing, arcs, bring, start
 from flexclear.system.errors import InputError
-from tests.analytic.test_contact_surfaces import CLEARANCE, LENGTH, RADIUS, WAY, WEAR, WEIGHT, hanging
+from flexclear.system.progress import silent
+from tests.analytic.mechanism_runs import TREE
+from tests.analytic.test_contact_surfaces import CLEARANCE, LENGTH, RADIUS, WAY, WEAR, WEIGHT, frame, hanging, simulate
 
 #: depth that a cycle of the hanging carrier takes from the pin, which wears alone, all around [m]
 PER_CYCLE = WEAR["coefficient"] * WEIGHT * WAY / WEAR["hardness"] / (2.0 * np.pi * RADIUS * LENGTH)
@@ -139,6 +144,63 @@ def test_a_scene_without_wear_is_refused() -> None:
     del table["joint"]["hole"]["wear"]
     with pytest.raises(InputError, match="no joint has wear"):
         bring(Scene.model_validate(table), None, 1.0)  # type: ignore[arg-type]
+
+
+def worn(shape: tuple[int, int], radius: float, clearance: float, height: float) -> dict[str, Any]:
+    """Waves around both surfaces; with no height the depths are constant."""
+    angle = 2.0 * np.pi * (np.arange(shape[1]) + 0.5) / shape[1]
+    outer, inner = (
+        np.tile(depth * (1.0 + height * wave), (shape[0], 1)).tolist()
+        for depth, wave in ((1e-5, np.cos(3.0 * angle)), (2e-5, np.sin(2.0 * angle)))
+    )
+    return {"radii": [radius + clearance, radius], "outer": outer, "inner": inner}
+
+
+def pin_on_waves() -> Scene:
+    """The carrier drops onto the turning shaft, rebounds and rubs."""
+    table = hanging()
+    table["body"]["carrier"]["pose"] = frame((0.0, 0.0, -0.8 * CLEARANCE))
+    del table["joint"]["hole"]["initial_approach_speed"]
+    table["joint"]["hole"] |= {
+        "normal": {"law": "flores", "restitution": 0.7, "stiffness": 1e9},
+        "friction": {"law": "ambrosio", "dynamic": 0.1, "v0": 1e-4, "v1": 1e-3},
+        "wear": WEAR | {"shapes": {"hole": worn((1, 36), RADIUS, CLEARANCE, 0.5)}},
+    }
+    return Scene.model_validate(table)
+
+
+def ball_on_waves() -> Scene:
+    given = load_scene(TREE / "scenes" / "checks" / "socket_swing.toml", {"time.end": "20 ms", "output.horizon": False})
+    wear = {"coefficient": 1e-4, "hardness": 2e9, "shapes": {"contact": worn((18, 36), 0.02, 5e-4, 0.5)}}
+    changes = {"joint.contact.wear": wear, "body.ball.angular_velocity": [3.0, 5.0, 20.0]}
+    friction = {"law": "ambrosio", "dynamic": 0.1, "v0": 1e-4, "v1": 1e-3}
+    return edited(given, {**changes, "joint.contact.friction": friction})
+
+
+@pytest.mark.parametrize("made", [pin_on_waves, ball_on_waves])
+def test_the_ledger_closes_on_worn_surfaces(made: Callable[[], Scene]) -> None:
+    """Forces and moments do the work that gap and energies say; the gap's slopes are up to a tenth here."""
+    run = dynamics.simulate(made(), {}, silent)
+    assert run["contact_normal_force"].values.max() > 0.0
+    assert float(np.abs(run["energy_error"]).max()) < 1e-8 * float(run.attrs["exchanged_energy"])
+
+
+def test_constant_depths_give_the_round_joint_with_more_clearance() -> None:
+    more = CLEARANCE + 3e-5
+    tables = [hanging(), hanging()]
+    for table in tables:
+        table["body"]["carrier"]["pose"] = frame((0.0, 0.0, -more - WEIGHT / 1e6))
+    tables[0]["joint"]["hole"]["clearance"] = more
+    tables[1]["joint"]["hole"]["wear"] = WEAR | {"shapes": {"hole": worn((1, 36), RADIUS, CLEARANCE, 0.0)}}
+    round_, shaped = (simulate(table) for table in tables)
+    every = np.linspace(0.0, 0.25, 73)
+    for name, size in (("contact_gap", 1e-4), ("contact_normal_force", WEIGHT), ("position", 1e-4)):
+        one, other = (run[name].interp(time=every).values for run in (round_, shaped))
+        # the motion is at rest to the rounding of the start, which the tolerance of 1e-10 may keep
+        assert other == pytest.approx(one, abs=1e-9 * size)
+    # the worn pin is thinner by 20 um, which shortens the way
+    way = [float(run["wear_sliding_distance"].values[-1, 0]) for run in (round_, shaped)]
+    assert way[1] == pytest.approx(way[0] * (1.0 - 2e-5 / RADIUS), rel=1e-8)
 
 
 def profile_of(radius: float, name: str = "hole", law: dict[str, Any] | None = None) -> dict[str, Any]:
