@@ -15,7 +15,7 @@ from flexclear.system.progress import Progress
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Assemble ``wear.nc`` (schema WEAR) and its figure.
 
-    params: `title`; of each of the `joints` clearance, radius and whether it is a pin; of each of the `steps` the
+    params: `title`; of each of the `joints` clearance and radius of the inner surface; of each of the `steps` the
     cycles, the error, and by joint depths and depths per cycle.  inputs: ``post0`` ..., of the runs of the steps.
     """
     from flexclear.post.overview.wear_figure import figure

@@ -120,10 +120,7 @@ class Study:
 
     def task(self) -> Task:
         """Return the task of the dataset of all steps so far, with its figure."""
-        joints = {
-            name: {"clearance": joint.clearance, "radius": joint.radius, "pin": not is_ball(joint)}
-            for name, joint in self.joints.items()
-        }
+        joints = {n: {"clearance": joint.clearance, "radius": joint.radius} for n, joint in self.joints.items()}
         steps = [
             {"cycles": one.cycles, "error": one.error}
             | {key: {n: d.tolist() for n, d in getattr(one, key).items()} for key in ("depths", "rates")}

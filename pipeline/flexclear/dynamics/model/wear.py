@@ -29,7 +29,8 @@ def fill(filling: Filling) -> dict[str, Any]:
     mechanism = filling.numbering.mechanism
     rows, values = list[tuple[int, ...]](), list[float]()
     for contact, name in zip(_worn(mechanism), mechanism.scene.wearing_joints(), strict=True):
-        shapes, halvings, firsts = shapes_of(mechanism.scene, name), (-1, 0), list[int]()
+        shapes, firsts = shapes_of(mechanism.scene, name), list[int]()
+        halvings: tuple[int, ...] = (-1, 0)
         for depths in (shapes.outer, shapes.inner) if shapes else ((), ()):
             firsts.append(len(values))
             if depths:
