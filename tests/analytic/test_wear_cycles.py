@@ -130,7 +130,7 @@ def test_a_pin_that_turns_wears_all_around_in_proportion_to_the_cycles(place: Wo
 def test_a_crank_pin_wears_its_journal_where_the_rod_pushes_and_pulls(place: Workplace) -> None:
     """As Flores (2009), Mechanism and Machine Theory 44, 1211-1222, finds: wear is not uniform around the journal.
 
-    Depths per cycle fall as the grooves widen (Archard, a constant volume over more area), and forces grow with the gap.
+    Depths per cycle fall as the grooves widen (a constant volume over more area), and forces grow with the gap.
     """
     scene = load_scene(TREE / "scenes" / "gallery" / "worn_crank.toml")
     made = bring(scene, place, 2e5, tolerance=0.04).dataset().sel(worn="pin")
