@@ -257,6 +257,14 @@ def _backlash(run: xr.Dataset, scene: Scene) -> str:
     return f"The wheel swings by {wheel:.2f}°, {pinion / 3.0 - wheel:.2f}° less than the teeth's ratio gives."
 
 
+def _worn_crank(run: xr.Dataset, scene: Scene) -> str:
+    post = derive(run)
+    depth = np.sort(post["wear_depth_outer"].sel(worn="pin").values[0])[::-1]
+    most = 100.0 * depth[: len(depth) // 4].sum() / depth.sum()
+    volume = float(post["wear_volume"].sel(worn="pin"))
+    return f"A million turns would wear {1e15 * volume:.0f} mm³, {most:.0f} % of it in a quarter of the journal."
+
+
 def _controllers(run: xr.Dataset, scene: Scene) -> str:
     push = abs(run["controller_force"]).max("time")
     return f"The hardest push is {float(push.max()):.3g} N, by '{push.idxmax().item()}'."
@@ -275,6 +283,7 @@ ENTRIES = {
     for entry in (
         Entry("gallery/four_bar", "How far does the rocker swing, and what must the motor supply?", _four_bar),
         Entry("checks/clearance_slider_crank", "What does 0.1 mm of clearance do at 5000 rpm?", _slider_crank),
+        Entry("gallery/worn_crank", "Where does the crank pin wear its journal?", _worn_crank),
         Entry("gallery/scott_russell", "How straight is its straight line?", _scott_russell),
         Entry("gallery/six_bar", "How far does a rocker swing that a loose, bending link drives?", _six_bar),
         Entry("gallery/rssr", "How far does a rocker across the crank's axis swing?", _rssr),

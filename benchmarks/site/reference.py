@@ -29,6 +29,7 @@ DATASETS: dict[str, tuple[str, Schema]] = {
     ),
     "State space": ("from `flexclear export --format state-space` and `flexclear.state_space`", artifacts.STATE_SPACE),
     "Campbell diagram": ("from `flexclear frequencies --speeds`", artifacts.CAMPBELL),
+    "Wear over many cycles": ("`wear.nc`, from `flexclear wear` and `flexclear.wear`", artifacts.WEAR),
     "Sections": ("from `flexclear sections`", artifacts.SECTIONS),
     "Verdict": ("from `flexclear sections`", VERDICT),
 }

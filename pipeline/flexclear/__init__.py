@@ -43,6 +43,7 @@ __all__ = [
     "stage",
     "state_space",
     "sweep",
+    "wear",
 ]
 
 

@@ -196,6 +196,20 @@ def sections(scene: AnyScene) -> tuple[xr.Dataset, xr.Dataset]:
     return recorded, verdict
 
 
+def wear(scene: AnyScene, cycles: float, *, per_run: float = 1.0, tolerance: float | None = None) -> xr.Dataset:
+    """Wear the surfaces of a scene's loose joints over many cycles (schema WEAR), by runs and steps between them.
+
+    The run of the scene is `per_run` cycles. tolerance: estimated error of the depths of a step, as fraction of the
+    clearance; by default that of ``flexclear wear``.  Finished runs come from the cache.  Raises FlexclearError:
+    InputError for a scene without wear.
+    """
+    from flexclear.study.wear import TOLERANCE, bring
+
+    allowed = TOLERANCE if tolerance is None else tolerance
+    scenes.examine(one := _loaded(scene))
+    return bring(one, open_workplace(), cycles, per_run=per_run, tolerance=allowed).dataset()
+
+
 def sensitivities(scene: AnyScene, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
     """Return derivatives of quantities by numbers of a scene, through its impacts; from the cache when fresh.
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from flexclear.artifacts.schema import RUN
-from flexclear.post.single_run.series import PIECES, _area, derive, spread_over_surface
+from flexclear.post.single_run.series import PIECES, derive, spread_over_surface, surface_area
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import Start
@@ -265,7 +265,8 @@ def test_a_map_keeps_totals_and_puts_them_where_the_contact_was() -> None:
     assert found[band, :4, 0] == pytest.approx(np.pi / 4.0, abs=np.radians(1.0) / PIECES)
     assert np.count_nonzero(found[:, 4:]) == 0
     ball = {"ball_radius": 0.01, "clearance": 1e-3}
-    assert [_area(ball, side) for side in ("outer", "inner")] == pytest.approx([4e-6 * 121 * np.pi, 4e-4 * np.pi])
+    areas = [surface_area(ball, side) for side in ("outer", "inner")]
+    assert areas == pytest.approx([4e-6 * 121 * np.pi, 4e-4 * np.pi])
 
 
 def test_an_impact_takes_what_the_rebound_lacks() -> None:

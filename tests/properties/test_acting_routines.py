@@ -97,6 +97,13 @@ def loads(random: np.random.Generator, number: int, joints: Table) -> Table:
     return found
 
 
+def worn(joint: Table, random: np.random.Generator) -> Table:
+    """Worn surfaces of a joint: depths of micrometres by band and sector."""
+    radius = joint["ball_radius"] if "ball_radius" in joint else joint["pin_radius"]
+    depths = 1e-6 * random.random((2, 4 if "ball_radius" in joint else 1, 7))
+    return {"radii": [radius + joint["clearance"], radius], "outer": depths[0].tolist(), "inner": depths[1].tolist()}
+
+
 def table(number: int) -> Table:
     """A tree of rods on joints, some with clearance, under loads; some joints have ends, some are driven."""
     random = np.random.default_rng([number, 9])
@@ -104,8 +111,8 @@ def table(number: int) -> Table:
     kinds = [IDEAL[random.integers(2)], *random.choice(IDEAL, size=4), *loose]
     order = random.permutation(len(kinds))
     made = rods(8, tuple(str(kinds[k]) for k in order), int(random.integers(1, 4)))
-    contacts = [joint for joint in made["joint"].values() if joint["type"] in SURFACES]
-    for k, joint in enumerate(contacts):
+    contacts = {name: joint for name, joint in made["joint"].items() if joint["type"] in SURFACES}
+    for k, (name, joint) in enumerate(contacts.items()):
         law = list(NORMAL)[(number + 5 * k) % len(NORMAL)]
         joint |= SURFACES[joint["type"]] | {"normal": {"law": law, "stiffness": 1e8} | NORMAL[law]}
         friction = [*FRICTION, None][(number // 2 + k) % (len(FRICTION) + 1)]
@@ -113,6 +120,8 @@ def table(number: int) -> Table:
             joint["friction"] = {"law": friction} | FRICTION[friction]
         if (number + k) % 3 == 0 and "slot" not in joint["type"] and "plane" not in joint["type"]:
             joint["wear"] = {"coefficient": 1e-4, "hardness": 1e9}
+            if friction != "lugre":
+                joint["wear"]["shapes"] = {name: worn(joint, np.random.default_rng(number))}
         if (number + k) % 2 == 0 and joint["type"] in ("clearance-revolute", "clearance-spherical"):
             # forces of thin films take the fifth power of the rounding of an eccentricity of 1
             joint["film"] = {"viscosity": 0.1, "roughness": 0.3 * joint["clearance"]}

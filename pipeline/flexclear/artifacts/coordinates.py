@@ -63,6 +63,7 @@ event_motion? | event | | rotation for an event along an angle, else translation
 contact_motion? | contact | | rotation for a contact that limits an angle, else translation
 rubbing? | rubbing | | name of the ideal joint with friction
 worn? | worn | | name of the contact that wears
+step? | step | 1 | number of the step of wear, from 0
 band? | band | 1 | number of the band of equal height on a sphere, from its lower pole on
 sector? | sector | 1 | number of the sector about z of the surface's frame, from x on
 pass_joint? | singular_pass | | joint on whose coordinate the branches differ most
@@ -117,7 +118,7 @@ component? | component | 1 | direction of the motion, by variance, from 0
 #: dimensions whose entries are named by numbers only, and the number of the first entry
 NUMBERED = {
     **dict.fromkeys(("node", "cell", "corner", "around", "point", "lump", "section", "slice", "station", "fibre"), 0),
-    **dict.fromkeys(("followed", "lag", "component", "band", "sector"), 0),
+    **dict.fromkeys(("followed", "lag", "component", "step", "band", "sector"), 0),
     **dict.fromkeys(("mode", "mode2", "rigid_mode"), 1),
 }
 #: dimensions whose entries are always the same

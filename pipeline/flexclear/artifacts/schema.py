@@ -241,6 +241,24 @@ impact_quaternion? | impact body quat | 1 | unit quaternion at the closing
 impact_velocity? | impact body axis | m s-1 | velocity of the centre of mass at the closing
 """)
 
+#: wear over many cycles: at the begin of each step, the surfaces, and the run with them
+WEAR: Schema = table("""
+cycles | step | 1 | cycles done
+step_error | step | 1 | estimated error of the depths of the step that ends here, over the clearance
+worn_clearance | step worn | m | radial clearance with the mean depths of both surfaces
+worn_gap | step worn | m | radial clearance with the largest depths of both surfaces
+peak_force | step worn | N | largest normal contact force of the run
+run_volume | step worn | m3 | volume that the run wears, of both surfaces together
+wear_sectors | worn | 1 | sectors in use, around z of the frames
+wear_bands | worn | 1 | bands in use: one of a pin
+radius_outer | worn | m | radius of the socket or journal without wear
+radius_inner | worn | m | radius of the ball or pin without wear
+depth_outer | step worn band sector | m | depth worn off the socket or journal
+depth_inner | step worn band sector | m | depth worn off the ball or pin
+rate_outer | step worn band sector | m | depth that a cycle takes from the socket or journal
+rate_inner | step worn band sector | m | depth that a cycle takes from the ball or pin
+""")
+
 _STILL = """position quaternion frame_position joint_force joint_moment joint_position modal_coordinate
 drive_force drive_position load_force load_moment load_length contact_gap contact_penetration contact_force
 contact_normal_force contact_offset potential elastic"""

@@ -32,6 +32,7 @@ COMMANDS = {
     "plan": "select the effects, modes and tolerance that the requested accuracy needs",
     "effects": "measure how each part changes each quantity, alone and in pairs",
     "sections": "classify a repeated motion as periodic, quasi-periodic or chaotic",
+    "wear": "wear the surfaces of loose joints over many cycles",
     "frequencies": "compute an equilibrium and its natural frequencies",
     "export": "write a scene for other programs: FMU, state space, loads on a flexible body",
     "report": "write the page of scenes: answers, film, figures, assumptions, cost",

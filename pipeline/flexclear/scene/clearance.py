@@ -3,14 +3,18 @@
 The friction law 'modified-coulomb' is described in `dynamics.contact.friction.modified_coulomb`.
 """
 
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
 from flexclear.scene.fields import Length, Mass, Number, Part, Positive, Pressure, Speed
 from flexclear.scene.law_expressions import FrictionExpression, NormalExpression
+from flexclear.scene.worn_profile import read_profile
 
 Share = Field(ge=0.0, le=1.0)
+#: depths of a surface [m], by band and sector
+Depths = tuple[tuple[float, ...], ...]
 
 
 class Material(Part):
@@ -265,6 +269,24 @@ def _not_above(dynamic: float, static: float) -> None:
         )
 
 
+class Shapes(Part):
+    """Worn surfaces of a joint, outer and inner: unworn radii [m], and depths [m] by band and sector."""
+
+    radii: tuple[Length, Length]
+    """radii without wear"""
+    outer: Depths
+    """depths of the socket or journal; a pin's journal has one band"""
+    inner: Depths
+    """depths of the ball or pin"""
+
+    @model_validator(mode="after")
+    def _check_depths(self) -> Self:
+        sizes = {len(row) for side in (self.outer, self.inner) for row in side}
+        if len(sizes) != 1 or min(sizes) < 4 or len(self.outer) != len(self.inner) or not self.outer:
+            raise ValueError("a profile has the same number of sectors, at least four, in every band of both surfaces")
+        return self
+
+
 class Wear(Part):
     """Archard's wear of a contact: depth = coefficient * normal force * sliding distance / (hardness * area)."""
 
@@ -275,3 +297,18 @@ class Wear(Part):
     sectors: Annotated[int, Field(ge=4, le=720)] = 36
     """number of sectors about their axis into which both surfaces are divided for the map of depths; a ball and its
     socket also into bands of equal area"""
+    outer_share: Annotated[Number, Share] = 0.5
+    """fraction of the worn volume that `flexclear wear` takes from the socket or journal; the rest from ball or pin"""
+    profile: str | None = None
+    """file of worn surfaces, `wear.nc` of `flexclear wear`, whose last row shapes this joint; default: round ones"""
+    shapes: dict[str, Shapes] = Field(default_factory=dict)
+    """the worn surfaces read from that file, by joint; not written in a scene"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any) -> Any:
+        """Read the profile unless its numbers are given; afterwards only its name is stored."""
+        if not isinstance(data, dict) or data.get("shapes") or not isinstance(data.get("profile"), str):
+            return data
+        path = Path(data["profile"])
+        return {**data, "profile": path.name, "shapes": read_profile(path)}

@@ -28,7 +28,7 @@ SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accura
 #: largest number of scenes that extend each other in a row; each is read, and the extended ones are copied
 LONGEST_CHAIN = 50
 #: keys of parts that name files, which are searched for next to the scene
-FILES = ("mesh", "file", "from")
+FILES = ("mesh", "file", "from", "profile")
 EDITS = ("extends", "replace", "set", "remove")
 #: kinds of TOML files, as messages name them
 SCENE, SWEEP, RECIPE = "a scene", "a sweep of a scene", "a mesh recipe"
@@ -423,6 +423,10 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
     start = table.get("start")
     if isinstance(start, dict) and isinstance(start.get("from"), str) and not start.get("recorded"):
         start["from"] = str(start["from"] if Path(start["from"]).is_absolute() else absolute(start["from"]))
+    for joint in table.get("joint", {}).values():
+        wear = joint.get("wear") if isinstance(joint, dict) else None
+        if isinstance(wear, dict) and isinstance(wear.get("profile"), str) and not wear.get("shapes"):
+            wear["profile"] = str(wear["profile"] if Path(wear["profile"]).is_absolute() else absolute(wear["profile"]))
     for law in _tables([table.get(family) for family in ("drive", "load", "event")]):
         if not Path(law["file"]).is_absolute():
             law["file"] = absolute(law["file"])

@@ -103,8 +103,11 @@ STOPS = Effect(
 WEAR = Effect(
     "wear",
     lambda scene: () if scene.wearing_joints() else None,
-    topology={"worn": "contact"},  # contacts with wear
-    changeable=("joint.wear",),
+    # contacts with wear; outer0, inner0: first numbers of the profiles of worn surfaces. halvings, heights: of their
+    # intervals of angle and height; -1: round, 0: of a pin
+    topology={"worn": "contact outer0 inner0 halvings heights"},
+    numbers={"profiles": "value"},
+    changeable=tuple(f"joint.wear.{key}" for key in ("coefficient", "hardness", "sectors", "outer_share")),
     ledger=True,
 )
 

@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.dynamics.specialise.intervals import NOWHERE, cubic, interval
 from flexclear.dynamics.specialise.symbols import Indexed, select, smaller
 from flexclear.scene.tables import LookupTable
 
 #: fraction of a table's range by which rounding may pass its ends
 ROUNDING = 1e-9
-#: lower bound of an interval that does not exist
-NOWHERE = 1e300
 
 
 def length(levels: tuple[int, ...]) -> int:
@@ -73,22 +72,7 @@ def surface(numbers: Indexed, n: int, m: int, x: Any, y: Any) -> Any:
     return within(numbers, along, 0, x, within(numbers, across, 1, y, value))
 
 
-def interval(numbers: Indexed, first: int, levels: int, x: Any) -> Any:
-    """Return the number of the interval that contains x, of those whose lower bounds begin at `first`."""
-    k: Any = 0
-    for level in reversed(range(levels)):
-        step = 1 << level
-        k = k + select(numbers[first + k + step] <= x, step, 0)
-    return k
-
-
 def within(numbers: Indexed, first: int, upper: int, x: Any, value: Any) -> Any:
     """Return a value, not a number where x is outside of the table: this ends the run."""
     low, high = numbers[first], numbers[upper]
     return select(smaller(x - low, high - x) + ROUNDING * (high - low) < 0.0, nan, value)
-
-
-def cubic(numbers: Indexed, at: Any, s: Any) -> Any:
-    """Return a cubic whose coefficients begin at `at`."""
-    c0, c1, c2, c3 = (numbers[at + k] for k in range(4))
-    return c0 + s * (c1 + s * (c2 + s * c3))

@@ -34,7 +34,8 @@ def actions_of(tables: Tables, ground: Carrier, frames: list[Frame]) -> list[Act
 def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
     """Return contacts and stops, with the places of what steps read of them and of their books."""
     parts, slot, made = tables.parts, tables.nq + tables.nv, list[Action]()
-    worn = tables.table(m.NAMED["worn"])["contact"].tolist()
+    wearing = tables.table(m.NAMED["worn"])
+    worn = wearing["contact"].tolist()
     wear0 = slot + tables.size(m.SIZES["wear_slot"])
     for c, row in enumerate(tables.table(m.CONTACTS)):
         numbers, closed, latched = (
@@ -47,18 +48,29 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
         given: tuple[Any, ...]
         ends = [frames[row["outer"]], frames[row["inner"]]]
         if c < tables.size(m.N_SURFACES):
+            profile: tuple[Any, ...] = ()
             if c in worn:
+                profile = _profile(tables, wearing[worn.index(c)])
                 results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)
             bristle, rates = (cells(array, int(row["bristle"]), 3 * (row["bristle"] >= 0)) for array in (STATE, RATES))
             laws = form, parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
-            given = parts.surfaces[row["surfaces"]], laws, int(c in worn), numbers, closed, latched, bristle
+            given = parts.surfaces[row["surfaces"]], laws, int(c in worn), profile, numbers, closed, latched, bristle
         else:
             which = [int(row[name]) for name in ("surfaces", "subtracted") if row[name] >= 0]
             how, turns, counts = zip(*(_gauge(tables, k) for k in which), strict=True)
             given, rates = (form, how, numbers, closed, latched, turns), [cell for one in counts for cell in one]
             ends = [frames[tables.table(m.GAUGES)[k][end]] for k in which for end in ("a", "b")]
-        made.append(Action(touch if len(given) == 7 else stop, given, ends, [*results, *rates]))
+        made.append(Action(touch if c < tables.size(m.N_SURFACES) else stop, given, ends, [*results, *rates]))
     return made
+
+
+def _profile(tables: Tables, row: Any) -> tuple[Any, ...]:
+    """Return halvings and numbers of the profiles of both surfaces of a contact; () for round ones."""
+    if row["halvings"] < 0:
+        return ()
+    halvings = int(row["halvings"]), *([int(row["heights"])] * bool(row["heights"]))
+    firsts = (tables.row(m.NAMED["profiles"], row[side])[0].index for side in ("outer0", "inner0"))
+    return halvings, *(Span(SCENE, first) for first in firsts)
 
 
 def _gauge(tables: Tables, k: int) -> tuple[Any, list[Cell], list[Cell]]:

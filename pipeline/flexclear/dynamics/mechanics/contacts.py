@@ -16,6 +16,7 @@ from typing import Any
 from flexclear.dynamics.contact.form import FORMS
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.surfaces import SURFACES
+from flexclear.dynamics.contact.surfaces.profile import separate
 from flexclear.dynamics.contact.surfaces.separation import across
 from flexclear.dynamics.mechanics.coordinates import along
 from flexclear.dynamics.mechanics.trees import End, Numbers, moving, on_both, site_motion
@@ -48,6 +49,7 @@ def touch(
     surfaces: str,
     laws: tuple[str, str],
     worn: int,
+    profile: Any,
     numbers: Any,
     closed: Any,
     latched: Any,
@@ -56,19 +58,23 @@ def touch(
 ) -> Any:
     """Return what steps read of a contact, the rates of its books and bristles; then the wrenches on both bodies.
 
-    laws: form of its normal force, friction law or "".  worn: 1 with wear, else 0.  closed: 1 where the surfaces touch.
-    bristle: deflection, in axes of the outer frame, of a law that has some.  ends: of the outer and the inner surface.
+    laws: form of its normal force, friction law or "".  worn: 1 with wear, else 0.  profile: of worn surfaces, see
+    `contact.surfaces.profile.separate`, or ().  closed: 1 where the surfaces touch.  bristle: deflection, in axes of
+    the outer frame, of a law that has some.  ends: of the outer and the inner surface.
     Source: Wang & Wang (2019), eqs. (23), (24).
     """
     A, B = (site_motion(*end) for end in ends)
     p = B.p_WB - A.p_WB
-    near = SURFACES[surfaces].separation(numbers, A.R_WB, p, B.v - A.v - cross(A.omega, p))
-    gap, approach, n, turning, offset = near
+    v = B.v - A.v - cross(A.omega, p)
+    near = SURFACES[surfaces].separation(numbers, A.R_WB, p, v)
+    shaped = separate(profile, numbers, (A, B), near, v) if profile else None
+    gap, approach, n, turning, offset = shaped.separation if shaped else near
     z = across(n, A.R_WB @ Vector(bristle)) if bristle else ZERO
 
     def forces() -> Any:
         N, taken, stored = push(laws[0], numbers, -gap, approach, latched)
-        Q = B.p_WB + numbers.radius * n
+        N = shaped.steepness * N if shaped else N
+        Q = B.p_WB + (shaped.arm if shaped else numbers.radius * n)
         slip = across(n, moving(B, Q) - moving(A, Q))
         speed = sqrt(dot(slip, slip))
         friction, lost, bent, z_rate = rub(laws[1], numbers.friction_law, z, slip, N)
@@ -79,7 +85,9 @@ def touch(
     apart = (0.0,) * 6, ZERO, ZERO, (0.0,) * 5, ZERO
     read, F, Q, books, rate = branch(closed == 1, forces, lambda: apart)
     stored = gap, approach, read, F, A.R_WB.T @ offset, Q, books[: 5 if worn else 3], rate if bristle else ()
-    return stored, on_both(ends, B, Wrench(cross(Q - B.p_WB, F), F)), ()
+    moment = cross(Q - B.p_WB, F)
+    moment = moment + read[0] * shaped.moment if shaped else moment
+    return stored, on_both(ends, B, Wrench(moment, F)), ()
 
 
 @routine

@@ -13,6 +13,7 @@ from flexclear.dynamics.model.loads import acting_frames, describe
 from flexclear.dynamics.model.mechanism import Mechanism
 from flexclear.dynamics.model.start_table import given_coordinates
 from flexclear.dynamics.model.stops import End, ends
+from flexclear.dynamics.model.wear import shapes_of
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.schema import Scene, Sections
 from flexclear.system.errors import InputError, errors_from
@@ -36,6 +37,7 @@ def _checks_of_parts(scene: Scene) -> Iterator[Check]:
     yield from (partial(describe, scene, name) for name in scene.forces())
     yield partial(ends, scene, dict.fromkeys(scene.joint, 1.0))
     yield from (partial(coordinates_and_ratio, scene, name) for name in scene.rigid_gears())
+    yield from (partial(shapes_of, scene, name) for name in scene.wearing_joints())
     if scene.start is not None and scene.start.at != "ideal":  # else joints with clearance have coordinates, too
         yield partial(given_coordinates, scene)
 

@@ -243,7 +243,7 @@ def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Arrays:
         volume[k] = per_path * (path[-1, k] - path[0, k])
         for side in SURFACES:
             direction = run[f"wear_direction_{side}"].values[:, k]
-            area = _area(joints[name], side) / (own * rows)
+            area = surface_area(joints[name], side) / (own * rows)
             fractions = spread_over_surface(direction, np.stack([path[:, k], impulse[:, k]], axis=1), own, rows)
             maps[f"wear_depth_{side}"][k, :rows, :own] = per_path * fractions[..., 0] / area
             maps[f"wear_impulse_{side}"][k, :rows, :own] = fractions[..., 1]
@@ -257,7 +257,7 @@ def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Arrays:
     return totals | maps
 
 
-def _area(joint: dict[str, Any], side: str) -> float:
+def surface_area(joint: dict[str, Any], side: str) -> float:
     """Return the area of a surface [m^2]; half a sphere is not distinguished from a whole one."""
     widened = float(joint["clearance"]) if side == "outer" else 0.0
     if "ball_radius" in joint:
