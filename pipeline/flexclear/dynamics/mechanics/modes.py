@@ -80,7 +80,7 @@ class Modes:
 
     @property
     def accelerations(self) -> list[Any]:
-        """Of all shapes."""
+        """Return the accelerations of all shapes."""
         return [one for block in self.blocks for one in block.accelerations]
 
     # Bases and frames -------------------------------------------------------------------------------------------------
