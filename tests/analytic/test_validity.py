@@ -17,7 +17,7 @@ from flexclear.dynamics.contact import validity
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.evaluation.start import consistent_start
-from flexclear.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest_displacement
+from flexclear.dynamics.run.refusals.validity import BENT, SPIN, doubts, flexibles, largest_displacement
 from flexclear.dynamics.run.run import engine_of
 from flexclear.post.answers.stability import lost_energy
 from flexclear.scene.load import edited, load_scene
@@ -97,10 +97,10 @@ def test_the_values_of_a_rejected_step_are_not_reported() -> None:
     wild = rest.copy()
     wild[engine.model.nq : engine.model.nq + engine.model.nv] = 1e6
     engine.attempt(wild, 0.0)
-    assert "it turns at" in " ".join(doubts(engine))
+    assert "it turns at" in " ".join(doubts(engine, flexibles(engine.model)))
     engine.view(m.Y)[:] = rest
     before = engine.w.copy(), engine.n.copy()
-    assert doubts(engine) == []
+    assert doubts(engine, flexibles(engine.model)) == []
     assert np.array_equal(engine.w, before[0], equal_nan=True)
     assert np.array_equal(engine.n, before[1])
 

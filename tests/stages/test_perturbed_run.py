@@ -16,6 +16,7 @@ from flexclear import dynamics
 from flexclear.artifacts import quantities
 from flexclear.artifacts.quantities import LASTING
 from flexclear.dynamics.run import progress_rate, trajectory
+from flexclear.dynamics.run import run as integration
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.horizon import horizon
@@ -90,6 +91,16 @@ def test_a_run_that_is_looked_at_on_its_way_is_the_same(ends: tuple[float, ...])
         assert float(seen["time"][-1]) >= scene.time.start + min(end, 1.0) * span
         xr.testing.assert_equal(seen["position"], at_once["position"].isel(time=slice(seen.sizes["time"])))
     xr.testing.assert_identical(parts.whole().to_xarray(), at_once)
+
+
+def test_a_run_with_the_engine_of_another_tolerance_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit, and without an engine made anew."""
+    loose, tight = (check("clearance_slider_crank", **{"solver.rtol": rtol, "time.end": 0.02}) for rtol in (1e-4, 1e-6))
+    before, alone = SingleRun(loose, {}, silent), SingleRun(tight, {}, silent).whole()
+    before.whole()
+    monkeypatch.setattr(integration, "prepare", lambda *_: pytest.fail("an engine made anew"))
+    again = SingleRun(tight, {}, silent, known=before.engine).whole()
+    xr.testing.assert_identical(again.to_xarray(), alone.to_xarray())
 
 
 @pytest.mark.usefixtures("parting", "two")

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.artifacts.labelled import Labelled, LabelledArrays
+    from flexclear.dynamics.run.evaluation.engine import Engine
     from flexclear.dynamics.run.progress_rate import Judges
     from flexclear.scene.schema import Scene
     from flexclear.system.progress import Progress
@@ -33,8 +34,12 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     from flexclear.dynamics.run.progress_rate import DearError, affordable
     from flexclear.dynamics.single_run import SingleRun
 
+    known: list[Engine | None] = []
+
     def begun(edited: Scene, judges: Judges | None = None) -> SingleRun:
-        return SingleRun(edited, bundles, progress, judges)
+        run = SingleRun(edited, bundles, progress, judges, known[0] if known else None)
+        known[:] = known or [run.engine]
+        return run
 
     requested = scene.accuracy is not None and scene.accuracy.quantities
     if not requested:

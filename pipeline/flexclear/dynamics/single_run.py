@@ -9,6 +9,7 @@ from flexclear.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.artifacts.schema import mark_incomplete
 from flexclear.dynamics.events import phases
 from flexclear.dynamics.record.dataset import recorded, warnings
+from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.progress_rate import Judges
 from flexclear.dynamics.run.run import Run, RunInParts
 from flexclear.scene.schema import Scene
@@ -20,7 +21,12 @@ class SingleRun:
     """A run that is recorded in parts, as `RunInParts`, with the same errors; StoppedError holds the rows so far."""
 
     def __init__(
-        self, scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, judges: Judges | None = None
+        self,
+        scene: Scene,
+        bundles: Mapping[str, Labelled],
+        progress: Progress,
+        judges: Judges | None = None,
+        known: Engine | None = None,
     ) -> None:
         """Build and start a scene; arguments as of `RunInParts`."""
         self._progress, self._scene = progress, scene
@@ -28,7 +34,12 @@ class SingleRun:
         if scene.event:
             self._run = phases.simulated(scene, bundles, progress, judges)
         else:
-            self._run = RunInParts(scene, bundles, progress, judges)
+            self._run = RunInParts(scene, bundles, progress, judges, known)
+
+    @property
+    def engine(self) -> Engine | None:
+        """Engine of the run; None for one with events."""
+        return self._run.engine if isinstance(self._run, RunInParts) else None
 
     def until(self, time: float) -> LabelledArrays:
         """Return the run up to a time [s] or later, without predictability horizon and stresses that none requests."""

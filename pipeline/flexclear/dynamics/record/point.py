@@ -17,7 +17,6 @@ from flexclear.dynamics.model.contacts import arms
 from flexclear.dynamics.record.dataset import events_of, series, variables_for
 from flexclear.dynamics.record.ensemble import ball_offsets, difference_of_starts
 from flexclear.dynamics.record.motion import Motions
-from flexclear.dynamics.run.alike import engines_alike
 from flexclear.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
@@ -26,7 +25,7 @@ from flexclear.dynamics.run.horizon.periods import Cursor, parts_of_period, peri
 from flexclear.dynamics.run.horizon.repetition import require_periodic
 from flexclear.dynamics.run.ledger import require_closed
 from flexclear.dynamics.run.progress_rate import DearError, affordable, scene_without_comparison
-from flexclear.dynamics.run.run import follow, observe_run, require_shallow, rows_to_judge
+from flexclear.dynamics.run.run import engines, follow, observe_run, require_shallow, rows_to_judge
 from flexclear.dynamics.run.trajectory import Trajectory
 from flexclear.scene.load import with_numbers
 from flexclear.scene.quantity import MAGNITUDES, Recorded
@@ -137,7 +136,7 @@ class Runner:
     def _engines(self, scene: Scene) -> tuple[Engine, Callable[[str], Engine]]:
         """Return the engine of a point, and a function that makes engines with another integrator; one at a time."""
         with self._making:
-            engine, other = engines_alike(self.engine, scene, self.bundles)
+            engine, other = engines(scene, self.bundles, silent, self.engine)
             self.engine = self.engine or engine
 
         def heir(name: str) -> Engine:

@@ -21,6 +21,7 @@ from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.progress_rate import Look
 
 if TYPE_CHECKING:
+    from flexclear.dynamics.run.refusals.validity import Flexible
     from flexclear.dynamics.run.singular_poses.collocation import Collocation
     from flexclear.dynamics.run.singular_poses.passing import Pass
 
@@ -38,7 +39,7 @@ class Tape:
 
     rows: the record from the first row on, and those between outputs from the last one backwards (see
         `integrate.recording`).
-    doubted: flexible bodies with a warning that they left the range of linear modes.
+    flexible: the flexible bodies.  doubted: those with a warning that they left the range of linear modes.
     looks: samples of the progress rate, the first at the start.
     """
 
@@ -48,6 +49,7 @@ class Tape:
     selections: list[tuple[float, np.ndarray]]
     collocations: list[Collocation] = field(default_factory=list)
     passes: list[Pass] = field(default_factory=list)
+    flexible: list[Flexible] = field(default_factory=list)
     doubted: set[str] = field(default_factory=set)
     looks: list[Look] = field(default_factory=list)
 

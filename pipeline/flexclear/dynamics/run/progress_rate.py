@@ -17,9 +17,9 @@ from flexclear.system.errors import SolverError
 
 #: an explicit method ends when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
-#: a scene without method runs by the default one if that takes at most so many evaluations, some seconds; the
-#: prediction starts after so many
-AFFORDABLE, EARLIEST = 1_500_000, 100_000
+#: a scene without method runs by the default one if that takes at most so many evaluations, with those of its perturbed
+#: run some seconds; the prediction starts after so many
+AFFORDABLE, EARLIEST = 1_000_000, 100_000
 #: tolerance of expensive runs that are compared with no other: members' starts differ by a hundredth of a micrometre
 UNVERIFIED = 1e-7
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -13,13 +13,15 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.drives.pieces import Pieces
+from flexclear.dynamics.effects import scheme_of
 from flexclear.dynamics.equations import observation
 from flexclear.dynamics.equations.observation import Blocks, Observed
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.model.plausibility import start_errors
+from flexclear.dynamics.model.refill import refill_model
 from flexclear.dynamics.run import trajectory as stepping
-from flexclear.dynamics.run.evaluation.engine import Engine, another, prepare
+from flexclear.dynamics.run.evaluation.engine import Engine, another, assemble, prepare
 from flexclear.dynamics.run.evaluation.observation import observe_blocks
 from flexclear.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.dynamics.run.horizon.horizon import Pair
@@ -112,15 +114,26 @@ def with_start_state(scene: Scene, bundles: Mapping[str, Labelled], progress: Pr
 
 
 def engines(
-    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, known: Engine | None = None
 ) -> tuple[Engine, Callable[[str], Engine]]:
-    """Return the engine of a run, and a function that makes an engine for another integrator, by name."""
-    made = maker(scene, bundles, progress)
+    """Return the engine of a run, and a function that makes an engine for another integrator, by name; known: as of
+    `maker`."""
+    made = maker(scene, bundles, progress, known)
     return made(), cache(made)
 
 
-def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[..., Engine]:
-    """Return a function that makes the engine of a run for an integrator's name, by default the scene's."""
+def maker(
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, known: Engine | None = None
+) -> Callable[..., Engine]:
+    """Return a function that makes the engine of a run for an integrator's name, by default the scene's.
+
+    known: engine of another edit with the same bundles. Its compiled functions and checks serve the new one where they
+    can, with equal results to the last bit.
+    """
+    alike = None if known is None or not _may_serve(known, scene) else refill_model(known.model, scene)
+    if known is not None and alike is not None:
+        same = partial(assemble, alike, known.entry, known.method, known.mobility, type(known))
+        return lambda name="", tell=progress: maker(scene, bundles, tell)(name) if name else same()
     posed, choice = with_start_state(scene, bundles, progress)
     moved, given = with_driven_actuators(posed, bundles, progress)
     making = Lock()  # a run and its perturbed run may both continue with another integrator
@@ -137,6 +150,13 @@ def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     return made
 
 
+def _may_serve(known: Engine, scene: Scene) -> bool:
+    """Return True when the scene uses the same kernels, needs no preceding run, and has an ordinary start."""
+    old = known.model.scene
+    paths = any(isinstance(drive, PathDrive) for drive in [*old.drive.values(), *scene.drive.values()])
+    return not paths and scheme_of(scene.solver) == scheme_of(old.solver) and not known.mobility.singular_start
+
+
 def integrate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Run:
     """Return the complete run of `RunInParts`; raise StoppedError on a request to stop."""
     run = RunInParts(scene, bundles, progress).whole()
@@ -150,17 +170,22 @@ class RunInParts:
     they produce it. It continues where it paused, with the same steps as in one go."""
 
     def __init__(
-        self, scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, judges: Judges | None = None
+        self,
+        scene: Scene,
+        bundles: Mapping[str, Labelled],
+        progress: Progress,
+        judges: Judges | None = None,
+        known: Engine | None = None,
     ) -> None:
         """Build and start a scene.
 
         bundles: reduced flexible bodies by name.  judges: decide whether another integrator continues; by default
-        explicit methods hand over when they would be too slow. Raises InputError for a scene that cannot be built,
-        SolverError for one that cannot start.
+        explicit methods hand over when they would be too slow.  known: as of `maker`.
+        Raises InputError for a scene that cannot be built, SolverError for one that cannot start.
         """
         self._scene, self._progress, self._judges = scene, progress, judges
-        self._made = made = maker(scene, bundles, progress)
-        self._engine = engine = made()
+        self._made = made = maker(scene, bundles, progress, known)
+        self.engine = engine = made()
         self._start = consistent_start(engine)
         self._mended, choice = tuple(mends(engine, self._start)), engine.model.mechanism.choice
         for sentence in [*self._mended, *([choice] if choice else [])]:
@@ -209,7 +234,7 @@ class RunInParts:
     def whole(self) -> Run:
         """Return the run to its end, and where it has contacts its perturbed run, which steps concurrently when a
         processor is free. On a request to stop it is the run so far, with the reason."""
-        pair, engine, judges = self._pair, self._engine, self._judges
+        pair, engine, judges = self._pair, self.engine, self._judges
         if pair is None:
             return self.until(np.inf)
 

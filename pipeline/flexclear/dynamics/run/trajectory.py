@@ -356,9 +356,10 @@ def _warn(engine: Engine, tape: Tape, progress: Progress) -> None:
     """Warn once for each flexible body that leaves the range of linear modes, before that may end the run."""
     if not engine.model.numbering.flexible:
         return
-    from flexclear.dynamics.run.refusals.validity import doubts
+    from flexclear.dynamics.run.refusals.validity import doubts, flexibles
 
-    for sentence in doubts(engine):
+    tape.flexible = tape.flexible or flexibles(engine.model)
+    for sentence in doubts(engine, tape.flexible):
         body = sentence.partition(":")[0]
         if body not in tape.doubted:
             tape.doubted.add(body)

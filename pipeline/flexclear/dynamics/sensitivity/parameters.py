@@ -8,14 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flexclear.artifacts.labelled import Labelled
-from flexclear.dynamics.run.alike import engines_alike
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import closed_start
 from flexclear.dynamics.run.horizon.tangents import Direction
+from flexclear.dynamics.run.run import engines
 from flexclear.dynamics.sensitivity.recipes import Varied
 from flexclear.scene.load import number_at, with_numbers
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError, SolverError
+from flexclear.system.progress import silent
 
 #: changes of a number, in its units, for the derivative of the start: the first one at which a start exists on both
 #: sides and at which differences over two and over four points agree, as a fraction of the start's change or, for
@@ -73,10 +74,10 @@ class Family:
         if parameter.path in self.varied:
             one = self.varied[parameter.path]
             bundles = {**self.bundles, one.body: one.bundle(self.bundles[one.body], amount)}
-            engine, _ = engines_alike(None, self.scene, bundles)
+            engine, _ = engines(self.scene, bundles, silent)
         else:
             edited = with_numbers(self.scene, {parameter.path: parameter.changed(amount)})
-            engine, _ = engines_alike(self.engine, edited, self.bundles)
+            engine, _ = engines(edited, self.bundles, silent, self.engine)
         if not np.array_equal(engine.model.arrays.h, self.engine.model.arrays.h):
             raise InputError(parameter.path, "changes the structure of the mechanism, not only numbers", "leave it out")
         return engine

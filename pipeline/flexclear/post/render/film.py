@@ -110,8 +110,9 @@ def solid(scene: pv.Plotter, surface: Surface, color: str, opacity: float, mesh:
 
 
 def _surface_of_flexible(scene: pv.Plotter, drawn: mechanism.Mechanism, body: mechanism.Flexible) -> pv.PolyData:
-    mesh = skin(mechanism.drawn_points(drawn.run, body, 0)[0], faces(body.bundle))
-    mesh["shade"] = mechanism.shade(drawn.run, body, 0)
+    points, shade = mechanism.shaded_points(drawn.run, body, 0)
+    mesh = skin(points, faces(body.bundle))
+    mesh["shade"] = shade
     q = np.abs(drawn.run.modal_coordinate.values[:, body.columns]).max(axis=1)
     largest = drawn.stress or max(float(mechanism.drawn_points(drawn.run, body, int(np.argmax(q)))[1].max()), 1e-12)
     if body.color is not None:
@@ -135,10 +136,7 @@ def _place(drawn: mechanism.Mechanism, actors: Actors, step: int, impact: bool) 
         if part.contact is not None:
             actor.prop.color = layout.IMPACT_COLOR if impact else layout.CLEARANCE_COLOR
     for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
-        mesh.points, mesh["shade"] = (
-            mechanism.drawn_points(drawn.run, bent, step)[0],
-            mechanism.shade(drawn.run, bent, step),
-        )
+        mesh.points, mesh["shade"] = mechanism.shaded_points(drawn.run, bent, step)
 
 
 def floor(scene: pv.Plotter, drawn: mechanism.Mechanism) -> None:

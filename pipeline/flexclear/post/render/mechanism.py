@@ -162,11 +162,12 @@ def drawn_points(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray
     return (points - moment / float(body.bundle.mass)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
 
 
-def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
-    """Return the coloured values at the points of `drawn_points`: von Mises stress [Pa], or displacement [m]."""
-    if body.stressed:
-        return body_shape.stress_on_surface(run, body.bundle, names(run, "body")[body.index], step)
-    return drawn_points(run, body, step)[1]
+def shaded_points(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of `drawn_points`, and what colours them: von Mises stress [Pa], or displacement [m]."""
+    points, displacement = drawn_points(run, body, step)
+    if not body.stressed:
+        return points, displacement
+    return points, body_shape.stress_on_surface(run, body.bundle, names(run, "body")[body.index], step)
 
 
 def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surface:

@@ -47,6 +47,9 @@ STUCK = 0.3
 DOUBT = 2.0
 #: default requested accuracy, as a fraction of each quantity's range; loosest and tightest tolerance of its ladder
 BY_DEFAULT, LOOSEST_RUNG, TIGHTEST_RUNG = 1e-3, 1e-4, 1e-10
+#: loosest tolerance of that ladder with contacts: clearances are some thousandths of a mechanism's size, to which
+#: tolerances refer
+LOOSEST_WITH_CONTACTS = 1e-5
 #: motions below this fraction of their natural size are rounding, which stiff rods magnify in forces
 ROUNDING_OF_MOTION = 1e-9
 
@@ -127,15 +130,19 @@ class Search:
     @property
     def ratio(self) -> float:
         """Ratio of neighbouring tolerances of the ladder."""
-        smooth = self.predictable and not self.scene.contacts() and not self.scene.stops()
-        return SMOOTH_RUNG if smooth else FINER_RUNG
+        return SMOOTH_RUNG if self.predictable and self._smooth else FINER_RUNG
+
+    @property
+    def _smooth(self) -> bool:
+        """True for a scene without contacts and stops."""
+        return not self.scene.contacts() and not self.scene.stops()
 
     @property
     def loosest(self) -> float:
         """First tolerance of the ladder."""
         assert self.scene.accuracy is not None
         if self.predictable:
-            return LOOSEST_RUNG
+            return LOOSEST_RUNG if self._smooth else LOOSEST_WITH_CONTACTS
         fractions = [want.relative for want in self.scene.accuracy.quantities.values() if want.relative is not None]
         guess = min((ABOVE_REQUEST * fraction for fraction in fractions), default=LOOSEST_TOLERANCE)
         return float(f"{np.clip(guess, 100.0 * TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE):.1e}")

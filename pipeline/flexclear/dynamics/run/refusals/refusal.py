@@ -72,9 +72,9 @@ def _doubts(engine: Engine) -> str:
         return f"; a negative gain pushes away from the reference: {', '.join(gains)}"
     if not engine.model.numbering.flexible:
         return ""
-    from flexclear.dynamics.run.refusals.validity import doubts
+    from flexclear.dynamics.run.refusals.validity import doubts, flexibles
 
-    return "".join(f"; {sentence}" for sentence in doubts(engine))
+    return "".join(f"; {sentence}" for sentence in doubts(engine, flexibles(engine.model)))
 
 
 def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:

@@ -7,7 +7,7 @@ clamped beam that rotates across its length (Wright et al. 1982), more on a hub 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil
 
@@ -90,11 +90,11 @@ def flexibles(model: Model) -> list[Flexible]:
 
 def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
     """Return warnings about flexible bodies that left the range of linear modes in the observed rows of a run."""
-    return _worst(model, time, seen.positions, seen.links)
+    return _worst(model, flexibles(model), time, seen.positions, seen.links)
 
 
-def doubts(engine: Engine) -> list[str]:
-    """Return such warnings about the state at the end of the last step; the engine is not changed."""
+def doubts(engine: Engine, bodies: Sequence[Flexible]) -> list[str]:
+    """Return such warnings about bodies in the state at the end of the last step; the engine is not changed."""
     with restore_work_array(engine):
         # the last evaluation may be of a step that was rejected, at speeds that the motion never had
         engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
@@ -102,17 +102,19 @@ def doubts(engine: Engine) -> list[str]:
         if not (np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.at)))):
             return []
         time = engine.control[m.TIME : m.TIME + 1]
-        return _worst(engine.model, time, coordinates, frames)
+        return _worst(engine.model, bodies, time, coordinates, frames)
 
 
-def _worst(model: Model, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray) -> list[str]:
-    """Return the warnings about all bodies; of the segments of a rod the worst of each kind.
+def _worst(
+    model: Model, bodies: Sequence[Flexible], time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray
+) -> list[str]:
+    """Return the warnings about flexible bodies; of the segments of a rod the worst of each kind.
 
     Shapes (rows, coordinate) and (rows, link), the latter fields of LINK_FRAMES.
     """
     found: dict[tuple[str, str], tuple[float, str]] = {}
     rod_of = {piece: rod for rod, pieces in model.scene.rods().items() for piece in pieces}
-    for body in flexibles(model):
+    for body in bodies:
         for kind, excess, text in _warnings_of_body(body, time, coordinates, frames):
             key = rod_of[body.name], kind
             found[key] = max(found.get(key, (0.0, "")), (excess, text))
