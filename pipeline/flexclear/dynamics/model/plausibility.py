@@ -113,22 +113,23 @@ def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
     joint = contact.joint
     if joint.initial_approach_speed is not None:
         return
-    problem, remedy = f"its surfaces start with a penetration of {length(depth)}", "enlarge the clearance"
-    problem += f" (clearance {length(joint.clearance)})"
-    began = depth <= DEEP * max(joint.clearance, joint.radius)
+    problem = f"its surfaces start with a penetration of {length(depth)} (clearance {length(joint.clearance)})"
+    remedies = ["move a body", "enlarge the clearance"]
     if isinstance(joint, End):
         unit = "rad" if joint.coordinate.turning else "m"
         problem = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}"
         end, more = ("upper", "more") if joint.sense > 0.0 else ("lower", "less")
-        remedy = f"set {end} to {_beyond(joint, depth):.6g} {unit} or {more}"
+        remedies = [f"set {end} to {_beyond(joint, depth):.6g} {unit} or {more}"]
     elif not joint.hollow:
         outer, inner = joint.surfaces
         problem = f"the {inner} starts with a penetration of {length(depth)} into the {outer}"
-        remedy = f"move a body, or lower the {outer}"
+        remedies[1] = f"lower the {outer}"
     elif contact.owner in replaceable_contacts(scene) and (scene.start is None or scene.start.at != "ideal"):
-        remedy = "start the joint as without clearance ([start] at = 'ideal'), or " + remedy
-    declared = ", or declare the speed at which this contact began as initial_approach_speed" if began else ""
-    raise InputError(f"[{contact.place}]", problem, remedy + declared)
+        remedies.insert(1, "start the joint as without clearance ([start] at = 'ideal')")
+    if depth <= DEEP * max(joint.clearance, joint.radius):
+        remedies.append("declare the speed at which this contact began as initial_approach_speed")
+    *others, last = remedies
+    raise InputError(f"[{contact.place}]", problem, f"{', '.join(others)}, or {last}" if others else last)
 
 
 def _beyond(end: End, depth: float) -> float:
