@@ -135,6 +135,12 @@ def test_a_contact_that_no_ideal_joint_replaces_is_named_in_the_answer():
     assert staying_contacts_sentence([]) == ""
 
 
+def test_an_effect_whose_change_is_less_than_twice_its_chance_is_not_certain_to_be_needed():
+    """0.27 m/s, next to chance of 0.42 m/s: 5.96 times 0.1 times the root of 2 over that of 4."""
+    found = study(weak=Pair(point(0.0, 0.1), point(0.5, 0.1), 4))
+    assert sentence(found, {}).startswith("For errors below 1 %, no effect is certain to be needed (undecided: weak).")
+
+
 def test_effects_that_the_budget_did_not_reach_are_named_last():
     found = study(strong=Pair(point(0.0), point(0.2), 0)).assign_attrs(undone="gravity")
     assert sentence(found, {}).endswith("Not examined within the budget: gravity.")
