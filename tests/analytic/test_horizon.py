@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexclear import dynamics
-from flexclear.artifacts.quantities import DIVERGED, PERTURBATION, SEPARATED, indices_of_lasting, separated_from
+from flexclear.artifacts.quantities import PERTURBATION, SEPARATED, indices_of_lasting, separated_from
 from flexclear.dynamics import analyses
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import consistent_start
@@ -159,8 +159,8 @@ def test_a_separation_counts_where_it_lasts(separated: list[int], first: list[in
     assert indices_of_lasting(np.arange(8.0), np.array(separated, dtype=bool), 2.5).tolist() == first
 
 
-#: separations of two runs: close, visible, diverged
-CLOSE, VISIBLE, FAR = 0.5 * SEPARATED, 2.0 * SEPARATED, 2.0 * DIVERGED
+#: separations of two runs as fractions of the largest motion: close, visible, diverged
+CLOSE, VISIBLE, FAR = 5e-4, 1e-2, 5e-2
 
 
 @pytest.mark.parametrize(

@@ -146,3 +146,17 @@ def test_stored_energy_is_the_integral_of_the_elastic_force(
     # a central difference of fourth order: 1e-12 (n+1)n(n-1)(n-2)(n-3)/30 off, and 1e-16 / 1e-3 of rounding
     near, far = (tried.stored(depth + k * step) - tried.stored(depth - k * step) for k in (1, 2))
     assert (8.0 * near - far) / (12.0 * step) == pytest.approx(tried.force(depth, 0.0, 1.0), rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["hunt-crossley", "herbert-mcwhannell", "lee-wang", "lankarani-nikravesh", "zhiying-qishao", "carvalho-martins"],
+)
+def test_the_range_that_a_warning_names_is_that_of_restitutions_delivered_within_a_twentieth(name: str) -> None:
+    warning = Law(name, 0.002, 1e9, 1.5).resolved.warning
+    assert warning is not None
+    low = float(warning.partition("meant for ")[2].split()[0])
+    for requested, agrees in ((low, True), (low - 0.01, False)):
+        resolved = Law(name, requested, 1e9, 1.5).resolved
+        assert (abs(float(resolved.delivered or 0.0) - requested) <= 0.05) == agrees
+        assert (resolved.warning is None) == agrees

@@ -12,10 +12,13 @@ from flexclear.artifacts.effect_size import POOLED, Agreement, agreement, same_s
 from flexclear.artifacts.points import Point
 from flexclear.commands.new import write
 from flexclear.dynamics.plan import search
-from flexclear.post.answers.plan import _verdict, verdict
+from flexclear.post.answers.effect_sizes import staying_contacts_sentence
+from flexclear.post.answers.plan import _verdict, dataset, table, verdict
 from flexclear.scene.load import edited, load_scene
+from flexclear.scene.plan_decisions import BOUND, Decision, Plan
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene
+from flexclear.scene.variants import Effect
 from flexclear.study.members import MEMBERS, Budget, Members
 
 
@@ -25,6 +28,17 @@ from flexclear.study.members import MEMBERS, Budget, Members
 )
 def test_met_and_missed_are_said_only_where_error_and_chance_agree(error, chance, allowed, said):
     assert verdict(Agreement(error, chance, allowed)) == said
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_plan_names_the_contacts_that_stay_whatever_it_decides(kept: bool):
+    decision = Decision(Effect("joint.A.clearance", "clearance", "", "A"), kept, BOUND, "", {"q": 1.0}, {"q": 0.0})
+    plan = Plan((decision,), {"q": 2.0}, "", 1e-6, {"q": 0.0}, {}, 10, 1)
+    made = dataset(plan, "title", {"q": "m"}).assign_attrs(staying=staying_contacts_sentence(["floor", "bed"]))
+    said = table(made).notes[0]
+    assert said.endswith("(its own effect: flexclear effects --of joint.floor joint.bed).")
+    assert ("must be modelled" in said) == kept
+    assert "floor and bed stay in every variant, as a ball on a plane has no ideal counterpart" in said
 
 
 def test_an_undecided_verdict_says_how_far_single_runs_scatter():

@@ -1,5 +1,6 @@
 """What a run refuses before it starts, `check` reports: the same errors, all at once, each with file and line."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -184,6 +185,21 @@ def test_check_and_run_report_the_same_errors_with_file_and_line(
         for key, (written, words) in expected.items():
             assert f"{scene} [{key}], line {text[: text.index(written)].count(chr(10)) + 1}: {words}" in said
         assert said.count(f"{scene} [") == len(expected)
+
+
+@pytest.mark.parametrize("end", ["upper = 0.1", "lower = 0.3"])
+def test_the_end_that_check_proposes_for_a_start_beyond_a_stop_is_accepted(
+    end: str, tmp_path: Path, command: Command, fresh: Path
+) -> None:
+    """The guide starts at 0.2357 m: so far beyond the end that no contact can have begun before the start."""
+    scene, stop = tmp_path / "own.toml", '[stop.end]\njoint = "guide"\nnormal = { law = "hertz", stiffness = 1e9 }\n'
+    scene.write_text(LOOSE + stop + end)
+    said = command("check", scene, code=2).err
+    assert "initial_approach_speed" not in said
+    proposed = re.search(r"set (upper|lower) to (\S+ m) or", said)
+    assert proposed is not None
+    scene.write_text(f'{LOOSE}{stop}{proposed[1]} = "{proposed[2]}"')
+    command("check", scene)
 
 
 #: scene, what is added to it -> key and words of its error; where a condition is true, and where a velocity is wrong,

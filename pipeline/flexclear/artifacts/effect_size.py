@@ -208,6 +208,12 @@ def change(without: Point, full: Point, quantity: Quantity, members: int) -> Inf
     return Influence(np.nan, np.nan) if refused else influence(without, full, quantity, members)
 
 
+def over_run(whole: Influence, early: Influence, quantity: Quantity) -> Influence:
+    """Return the change over the whole run, which is at least the one up to the horizon that chance does not hide."""
+    larger = quantity.over_time and early.difference > whole.difference
+    return replace(whole, difference=early.difference) if larger else whole
+
+
 def early_changes(
     without: Point,
     full: Point,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import combinations
+from math import ceil, floor, log10
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ SAME_POINT = 1e-3
 #: the angle, and largest difference of its cosine from 1, between directions that count as parallel
 PLANAR = {"revolute": "turns", "planar": "turns", "prismatic": "slides", "fixed": "fixed"}
 PARALLEL = 1e-6
+#: penetrations above this fraction of clearance or radius are mistakes, not contacts that began before the start
+DEEP = 0.1
 
 
 class Separation(NamedTuple):
@@ -112,22 +115,29 @@ def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
     joint = contact.joint
     if joint.initial_approach_speed is not None:
         return
-    problem, remedy = f"its surfaces start with a penetration of {length(depth)}", "enlarge the clearance"
-    problem += f" (clearance {length(joint.clearance)})"
+    problem = f"its surfaces start with a penetration of {length(depth)} (clearance {length(joint.clearance)})"
+    remedies = ["move a body", "enlarge the clearance"]
     if isinstance(joint, End):
         unit = "rad" if joint.coordinate.turning else "m"
-        problem, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
+        problem = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}"
+        end, more = ("upper", "more") if joint.sense > 0.0 else ("lower", "less")
+        remedies = [f"set {end} to {_beyond(joint, depth):.6g} {unit} or {more}"]
     elif not joint.hollow:
         outer, inner = joint.surfaces
         problem = f"the {inner} starts with a penetration of {length(depth)} into the {outer}"
-        remedy = f"lower the {outer}"
-    elif contact.owner in replaceable_contacts(scene):
-        remedy = "start the joint as without clearance ([start] at = 'ideal'), " + remedy
-    raise InputError(
-        f"[{contact.place}]",
-        problem,
-        f"move a body, {remedy}, or declare the speed at which this contact began as initial_approach_speed",
-    )
+        remedies[1] = f"lower the {outer}"
+    elif contact.owner in replaceable_contacts(scene) and (scene.start is None or scene.start.at != "ideal"):
+        remedies.insert(1, "start the joint as without clearance ([start] at = 'ideal')")
+    if depth <= DEEP * max(joint.clearance, joint.radius):
+        remedies.append("declare the speed at which this contact began as initial_approach_speed")
+    *others, last = remedies
+    raise InputError(f"[{contact.place}]", problem, f"{', '.join(others)}, or {last}" if others else last)
+
+
+def _beyond(end: End, depth: float) -> float:
+    """Return a limit with a tenth of `depth` to spare, rounded: loose pins may rest elsewhere without the stop."""
+    unit = 10.0 ** (floor(log10(depth)) - 1)
+    return end.sense * ceil((end.sense * end.limit + 1.1 * depth) / unit) * unit
 
 
 def length(metres: float) -> str:

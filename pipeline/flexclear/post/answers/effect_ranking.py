@@ -21,6 +21,7 @@ from flexclear.artifacts.effect_size import (
     chance,
     change,
     early_changes,
+    over_run,
     size,
 )
 from flexclear.artifacts.points import Point
@@ -94,8 +95,11 @@ def assemble(
     time integration of a run in a quantity up to a time [s].
     """
     names = list(pairs)
-    changes = [[influence_of(pairs[name], q) for q in chosen] for name in names]
     begun = [early_changes(p.without, p.full, chosen, p.members, times, error) for p in pairs.values()]
+    changes = [
+        [over_run(influence_of(pair, q), early, q) for q, early in zip(chosen, row, strict=True)]
+        for pair, (_, row) in zip(pairs.values(), begun, strict=True)
+    ]
     full = next(iter(pairs.values())).full
     scales = [size(full, q) if not full.refused else np.nan for q in chosen]
     differences = np.array([[c.difference for c in row] for row in changes])
@@ -147,7 +151,7 @@ def in_words(change: Influence, scale: float, unit: str) -> str:
     value = format_difference(change.difference, change.uncertainty, unit)
     part = f" ({format_to_digits(100.0 * largest / scale, 2)} % of its {size_of(unit)})"
     return (
-        f"changes by {'up to' if change.difference else 'less than'} <b class='n'>{value.removeprefix('< ')}</b>"
+        f"changes by {'less than' if value.startswith('<') else 'up to'} <b class='n'>{value.removeprefix('< ')}</b>"
         f"{part if largest < LARGE * scale else ''}"
     )
 

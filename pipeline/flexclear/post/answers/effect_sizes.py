@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.effect_size import Influence, change, early_changes, influence
+from flexclear.artifacts.effect_size import Influence, change, early_changes, influence, over_run
 from flexclear.artifacts.points import Point
 from flexclear.post.overview.curves import format_with_error, in_unit
 from flexclear.post.plotting.table import Table
@@ -91,6 +91,8 @@ def assemble(
                 begun.append(early_changes(lost, full, chosen, members, times, error))
             for k, quantity in enumerate(chosen):
                 variables = {"dropped": change(lost, full, quantity, members)}
+                if i == j:
+                    variables["dropped"] = over_run(variables["dropped"], begun[i][1][k], quantity)
                 variables["added"] = change(gained, bare, quantity, members)
                 if independent:
                     variables["interaction"] = _interaction(gained, single, bare, quantity, members)
@@ -206,8 +208,8 @@ def format_difference(value: float, uncertainty: float, unit: str) -> str:
         return "–"
     if np.isinf(value):
         return NOT_COMPARABLE
-    if value == 0.0 < uncertainty:
-        return f"< {in_unit(uncertainty, unit, 2)}"
+    if value < 0.05 * uncertainty:  # no digit of it would be shown
+        return f"< {in_unit(value + uncertainty, unit, 2)}"
     return format_with_error(value, uncertainty, unit) if uncertainty > 0.0 else in_unit(value, unit, 3)
 
 
