@@ -423,7 +423,7 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
     start = table.get("start")
     if isinstance(start, dict) and isinstance(start.get("from"), str) and not start.get("recorded"):
         start["from"] = str(start["from"] if Path(start["from"]).is_absolute() else absolute(start["from"]))
-    for law in _tables([table.get(family) for family in ("drive", "load", "event")]):
+    for law in _tables([table.get(family) for family in ("drive", "load", "event", "joint", "stop")]):
         if not Path(law["file"]).is_absolute():
             law["file"] = absolute(law["file"])
 
