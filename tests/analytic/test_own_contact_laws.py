@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from functools import reduce
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from flexclear.dynamics import analyses
 from flexclear.dynamics.linear.clearance_response import _separation
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
+from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
 from tests.analytic.test_sensitivities import agree
@@ -56,10 +59,10 @@ def closes(run: xr.Dataset, within: float = 1e-8) -> None:
     assert np.abs(run["energy_error"].values).max() < within * run.attrs["exchanged_energy"]
 
 
-def same(one: xr.Dataset, other: xr.Dataset, within: float) -> None:
+def same(one: xr.Dataset, other: xr.Dataset, within: float, of_times: float = 1e-9) -> None:
     """Two runs agree at the output times, and in their events."""
     assert other["event_kind"].values.tolist() == one["event_kind"].values.tolist()
-    assert other["event_time"].values == pytest.approx(one["event_time"].values, rel=1e-9)
+    assert other["event_time"].values == pytest.approx(one["event_time"].values, rel=of_times)
     times = np.intersect1d(one["time"].values, other["time"].values)
     a, b = (run.drop_duplicates("time").sel(time=times) for run in (one, other))
     assert len(times) > 50
@@ -171,3 +174,104 @@ def test_members_of_an_ensemble_have_the_law() -> None:
     )
     found = analyses.ensemble(one, {}, silent)
     assert found.sizes["member"] == 2
+
+
+# Tables ---------------------------------------------------------------------------------------------------------------
+def table(points: Any, of: list[tuple[str, str]], unit: str, between: str = "cubic") -> dict[str, Any]:
+    columns = [{"column": name, "unit": one} for name, one in of]
+    value = {"column": "value", "unit": unit}
+    return {"file": "made.csv", "of": columns, "value": value, "between": between, "points": points}
+
+
+#: K depth^1.5 with K = 1e10 N/m^1.5, at penetrations up to 0.4 mm that are denser where the curve bends
+SPRING = table([(4e-4 * x**2, 8e4 * x**3) for x in np.linspace(0.0, 1.0, 41).tolist()], [("depth", "m")], "N")
+STRIBECK, FAST = "(d + (s - d)*exp(-(slip/v)^2))*tanh(slip/w)", np.linspace(0.0, 1.0, 401) ** 2 * 20.0
+COEFFICIENTS = (0.08 + 0.04 * np.exp(-((FAST / 2.0) ** 2))) * np.tanh(FAST / 0.5)
+
+
+def test_a_constant_table_is_its_constant() -> None:
+    corners = [(v, f, 0.1) for v in (0.0, 100.0) for f in (0.0, 1e6)]
+    flat = table(corners, [("slip", "m/s"), ("force", "N")], "1", "linear")
+    coefficient = OWN_SLIDES["coefficient"].replace("m*", "table(mu, slip, normal_force)*")
+    values = {name: value for name, value in OWN_SLIDES["values"].items() if name != "m"}
+    looked_up = OWN_SLIDES | {"coefficient": coefficient, "values": values, "tables": {"mu": flat}}
+    one, other = (simulated(slider_crank(**{"joint.pin.friction": law})) for law in (OWN_SLIDES, looked_up))
+    same(one, other, 1e-6)
+
+
+def test_a_sampled_stribeck_curve_is_that_curve() -> None:
+    """Splines through 401 points miss it by 1e-8 of friction at most; rounding grows over the impacts."""
+    values = {"d": 0.08, "s": 0.12, "v": "2 m/s", "w": "0.5 m/s"}
+    known = {"law": "expression", "coefficient": STRIBECK, "values": values}
+    sampled = table(np.c_[FAST, COEFFICIENTS].tolist(), [("slip", "m/s")], "1")
+    law = {"law": "expression", "coefficient": "table(mu, slip)", "tables": {"mu": sampled}}
+    one, other = (simulated(slider_crank(**{"joint.pin.friction": one})) for one in (known, law))
+    same(one, other, 1e-5, 1e-7)
+    closes(other)
+    assert float(other["contact_friction_loss"].values[-1].sum()) > 1e-3
+
+
+def test_books_balance_with_a_force_by_a_table() -> None:
+    """The energy is that of each piece of the spline, which is near K d^1.5."""
+    law = OWN | {"force": "table(f, depth)*(1 + a*rate/impact_rate)", "values": {"a": 0.4}, "tables": {"f": SPRING}}
+    one, other = (simulated(slider_crank(**{"joint.pin.normal": normal})) for normal in (OWN, law))
+    closes(other)
+    closings = [run["event_time"].values[run["event_kind"].values == "closing"][:3] for run in (one, other)]
+    assert closings[1] == pytest.approx(closings[0], rel=1e-3)
+    assert other["contact_normal_force"].values.max() > 100.0
+
+
+def test_an_ideal_joint_rubs_by_a_table() -> None:
+    sampled = table(np.c_[FAST, COEFFICIENTS].tolist(), [("slip", "m/s")], "1")
+    values = {"d": 0.08, "s": 0.12, "v": "2 m/s", "w": "0.5 m/s"}
+    laws = (
+        {"law": "expression", "radius": "0.2 m", "coefficient": STRIBECK, "values": values},
+        {"law": "expression", "radius": "0.2 m", "coefficient": "table(mu, slip)", "tables": {"mu": sampled}},
+    )
+    one, other = (simulated(scene("pendulum", **{"joint.hinge.friction": law, "time.end": "1 s"})) for law in laws)
+    assert other["position"].values[-1] == pytest.approx(one["position"].values[-1], rel=1e-6)
+    assert float(one["joint_friction_loss"].values[-1].sum()) > 1e-2
+    slow = laws[1] | {"tables": {"mu": table([(0.0, 0.0), (0.01, 0.1)], [("slip", "m/s")], "1", "linear")}}
+    with pytest.raises(SolverError, match=r"joint hinge: slip = 0\.01 m/s leaves table mu"):
+        simulated(scene("pendulum", **{"joint.hinge.friction": slow, "time.end": "1 s"}))
+
+
+def test_a_run_ends_where_a_contact_leaves_its_table_and_says_so() -> None:
+    slow = table([(0.0, 0.0), (0.5, 0.1), (1.0, 0.1)], [("slip", "m/s")], "1", "linear")
+    law = {"law": "expression", "coefficient": "table(mu, slip)", "tables": {"mu": slow}}
+    says = r"contact pin: slip = [0-9.]+ m/s leaves table mu \(made.csv\), whose points are at 0 to 1 m/s"
+    with pytest.raises(SolverError, match=says):
+        simulated(slider_crank(**{"joint.pin.friction": law}))
+    thin = table([(1e-6 * k, 1.0 * k) for k in range(3)], [("depth", "m")], "N")
+    spring = {"law": "expression", "force": "table(f, depth)", "tables": {"f": thin}}
+    with pytest.raises(SolverError, match=r"contact pin: depth = [0-9.e-]+ m leaves table f"):
+        simulated(slider_crank(**{"joint.pin.normal": spring}))
+
+
+def test_derivatives_go_through_the_table_of_a_contact() -> None:
+    deep = table([(0.05 * x**2, 0.05 * x**3) for x in np.linspace(0.0, 1.0, 21).tolist()], [("depth", "m")], "m")
+    law = {
+        "law": "expression",
+        "force": "K*table(f, depth)*(1 + a*rate/impact_rate)",
+        "values": {"K": "1e6 N/m", "a": 0.4},
+        "tables": {"f": deep},
+    }
+    changed = {"joint.contact.normal": law, "time.end": 0.5, "solver.rtol": 1e-10}
+    of = ["ball.position.final", "ball.velocity.final", "contact.peak_force", "contact.impulse"]
+    agree(scene("bounce", **changed), of, {f"joint.contact.normal.values.{name}": 1e-2 for name in ("K", "a")}, 1e-3)
+
+
+def test_the_file_of_a_contact_is_searched_for_next_to_the_scene(tmp_path: Path) -> None:
+    rows = "\n".join(f"{x},{1e8 * x**1.5}" for x in np.linspace(0.0, 0.01, 30).tolist())
+    (tmp_path / "spring.csv").write_text(f"depth,force\n{rows}\n")
+    text = (TREE / "scenes/checks/bounce.toml").read_text()
+    columns = 'of = { column = "depth", unit = "m" }, value = { column = "force", unit = "N" }'
+    normal = (
+        f'normal = {{ law = "expression", force = "table(f, depth)", tables.f = {{ file = "spring.csv", {columns} }} }}'
+    )
+    (tmp_path / "my.toml").write_text(re.sub("normal = .*", normal, text))
+    law: Any = load_scene(tmp_path / "my.toml").joint["contact"]
+    assert len(law.normal.tables["f"].points) == 30
+    (tmp_path / "spring.csv").write_text("depth,force\n0,0\n1,nan\n")
+    with pytest.raises(InputError, match=r"spring\.csv has values that are no finite numbers"):
+        load_scene(tmp_path / "my.toml")

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 import flexclear as fc
 from flexclear.dynamics import analyses
-from flexclear.dynamics.loads import lookup as lookups
+from flexclear.dynamics import lookup as lookups
 from flexclear.dynamics.sensitivity.dataset import sensitivities
 from flexclear.dynamics.specialise import dual, symbols
 from flexclear.scene.load import scene_of

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
 
 from flexclear.dynamics.contact.expression import OPERATIONS, composed
 from flexclear.dynamics.contact.form import FORMS
@@ -103,7 +105,7 @@ def test_the_stored_energy_of_a_progressive_contact_counts_its_kinks(depth: floa
     found = resolved(
         "k*depth + max(0 N, m*(depth - d)) + max(0 N, m*(depth - 3*d))", k="1e6 N/m", m="4e6 N/m", d="1 mm"
     )
-    assert found.numbers.values[10:] == pytest.approx((1e-3, 3e-3), rel=1e-14)
+    assert found.numbers.values[12][:3] == pytest.approx((0.0, 1e-3, 3e-3), rel=1e-14)
     exact = 0.5e6 * depth**2 + sum(2e6 * max(0.0, depth - at) ** 2 for at in (1e-3, 3e-3))
     stored = from_python(FORMS[found.form].stored)(depth, found.numbers)
     assert stored == pytest.approx(exact, rel=1e-12)
@@ -119,6 +121,78 @@ def test_the_stored_energy_of_any_force_is_its_integral(force: str) -> None:
     for depth in (1e-6, 1e-3):
         exact = quad(lambda d: elastic(d, 0.0, 1.0, found.numbers)[0], 0.0, depth, epsrel=1e-13, epsabs=0.0)[0]
         assert stored(depth, found.numbers) == pytest.approx(exact, rel=1e-12)
+
+
+def looked_up(points: Any, *of: str, unit: str = "N") -> dict[str, Any]:
+    columns = [
+        {"column": name, "unit": {"depth": "m", "rate": "m/s", "slip": "m/s", "force": "N"}[name]} for name in of
+    ]
+    return {"file": "made.csv", "of": columns, "value": {"column": "value", "unit": unit}, "points": points}
+
+
+def test_the_stored_energy_of_a_table_is_the_integral_of_its_spline() -> None:
+    """SciPy's antiderivative of the same spline, whose third derivative jumps at each point."""
+    depths = np.linspace(0.0, 1.0, 37) ** 2 * 2e-3
+    forces = 1e6 * depths * (1.0 + np.sin(3000.0 * depths))
+    points = np.c_[depths, forces].tolist()
+    law = TypeAdapter(NormalLaw).validate_python(
+        {"law": "expression", "force": "table(f, depth)", "tables": {"f": looked_up(points, "depth")}}
+    )
+    law.check()
+    found, spline = resolve(law, MASS, REACH), CubicSpline(depths, forces)
+    for depth in (1e-6, 3.3e-5, 4.7e-4, 1.999e-3):
+        stored = from_python(FORMS[found.form].stored)(depth, found.numbers)
+        assert stored == pytest.approx(float(spline.antiderivative()(depth)), rel=1e-12)
+        assert parts(found, depth, 0.0, 1.0)[0] == pytest.approx(float(spline(depth)), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "force, of, points, words",
+    [
+        ("table(f, depth)", ["depth"], [(1e-6, 1.0), (1e-3, 2.0)], "no value at depth = 0 at rest: depth = 0 m leaves"),
+        (
+            "table(f, depth, rate)",
+            ["depth", "rate"],
+            [(d, v, 1.0) for d in (0, 1) for v in (1, 2)],
+            "rate = 0 m/s leaves",
+        ),
+        ("table(f, depth)", ["depth"], [(0.0, 1.0), (1e-3, -2.0)], "pulls"),
+        ("table(f, rate)", ["depth"], [(0.0, 1.0), (1e-3, 2.0)], "is over a value in m, not a value in m/s"),
+        ("table(f, depth)*1 m", ["depth"], [(0.0, 1.0), (1e-3, 2.0)], "but a force"),
+        ("1 N/m*depth", ["depth"], [(0.0, 1.0), (1e-3, 2.0)], "tables.f is not used"),
+    ],
+)
+def test_impossible_tables_of_forces_are_refused_in_words(force: str, of: list[str], points: Any, words: str) -> None:
+    law = {"law": "expression", "force": force, "tables": {"f": looked_up(points, *of)}}
+
+    def tried() -> None:
+        own = TypeAdapter(NormalLaw).validate_python(law)
+        own.check()
+        resolve(own, MASS, REACH)
+
+    with pytest.raises(ValueError, match=words):
+        tried()
+
+
+def test_a_table_of_a_coefficient_begins_at_rest_without_force() -> None:
+    def tried(points: Any) -> None:
+        own = TypeAdapter(Friction).validate_python(
+            {
+                "law": "expression",
+                "coefficient": "table(mu, slip, normal_force)",
+                "tables": {"mu": looked_up(points, "slip", "force", unit="1")},
+            }
+        )
+        own.check()
+        check(own)
+
+    tried([(v, f, 0.1 * min(v, 1.0)) for v in (0.0, 0.5, 1.0, 2.0) for f in (0.0, 10.0)])
+    with pytest.raises(ValueError, match=r"at which contacts begin: force = 0.001 N leaves table mu \(made.csv\)"):
+        tried([(v, f, 0.1 * v) for v in (0.0, 1.0) for f in (5.0, 10.0)])
+    with pytest.raises(ValueError, match=r"0\.1 at rest, where friction would jump"):
+        tried([(v, f, 0.1) for v in (0.0, 1.0) for f in (0.0, 10.0)])
+    with pytest.raises(ValueError, match="would drive the sliding"):
+        tried([(v, f, -0.1 * v) for v in (0.0, 1.0) for f in (0.0, 10.0)])
 
 
 def test_every_operation_of_the_language_is_composed() -> None:
@@ -219,7 +293,7 @@ K, K15 = {"K": "1e6 N/m"}, {"K": "1e9 N/m^1.5"}
         ("K*depth*step(rate/1 m/s)", K, "step\\(...\\) jumps"),
         ("K*depth + __import__('os')", K, "is not a quantity"),
         ("K*depth.real", K, "is unknown"),
-        ("+".join(f"a{k}*depth" for k in range(11)), {f"a{k}": "1 N/m" for k in range(11)}, "11 values, at most 10"),
+        ("+".join(f"a{k}*depth" for k in range(13)), {f"a{k}": "1 N/m" for k in range(13)}, "13 values, at most 12"),
         ("K*depth - F", {**K, "F": "1 N"}, "pulls: it is -1 N at rest at depth = 0"),
         ("K*depth - M*depth^2", {**K, "M": "2e8 N/m^2"}, "pulls"),
         ("K*depth*(1 - 0.5*rate/impact_rate)", K, "rebounds with .* of it"),
@@ -227,8 +301,8 @@ K, K15 = {"K": "1e6 N/m"}, {"K": "1e9 N/m^1.5"}
         ("K*depth + C*rate/depth", {**K, "C": "1 N s"}, "is no number at depth = 0"),
         ("K*sqrt((depth - 1 mm)*1 m)", K, "is no number at depth = 0"),
         ("K*depth", {**K, "restitution": 0.8}, "no damping.*restitution of 0.8 is asked"),
-        ("+".join(f"max(0 N, K*(depth - {k} mm))" for k in (1, 2, 3)), K, "3 kinks at rest, at most 2"),
-        ("K*table(depth)", K, "table"),
+        ("K*depth + max(0 N, K*(1 mm)*sin(depth/1 mm))", K, "kinks at rest, at most 1"),
+        ("K*table(stiff, depth)", K, "there is no table 'stiff'"),
     ],
 )
 def test_impossible_forces_are_refused_in_words(force: str, keys: dict[str, Any], words: str) -> None:

@@ -222,6 +222,8 @@ PORT_DATA = numbers("value")  # per port, r moving shapes: translation (3r), rot
 CONTACT_NUMBERS = numbers(
     "clearance radius floor stick_speed stiffness exponent damping values:12 friction_law:6 shape:3 length"
 )
+#: per contact: pieces of an elastic force by an expression (`contact.normal.expression`), its tables, those of friction
+CONTACT_TABLES = numbers("value")
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
 LOAD_NUMBERS = numbers("value")  # see `loads`

@@ -29,7 +29,6 @@ from flexclear.scene.owners import is_angle
 from flexclear.scene.parts import FlexibleBody
 from flexclear.scene.quantity import KINDS, Quantity, read_expression
 from flexclear.scene.tables import LookupTable
-from flexclear.scene.units import si, unit_exponents
 
 #: quantities that follow from positions and velocities: letter of their leaves
 READ = {
@@ -103,17 +102,12 @@ def expressions_of_load(scene: Any, load: Any) -> Iterator[tuple[str, list[Any]]
     known, local = constants_of(load.values, OF_LINES), OF_LINES if isinstance(load, LineExpression) else None
     require_used(known, load.texts)
     require_used(load.tables, load.texts, "tables")
-    tables = {name: _lookup(name, one) for name, one in load.tables.items()}
+    tables = {name: one.function(name) for name, one in load.tables.items()}
     for text in load.texts:
         try:
             yield text, read_expression(text, scene.owners(), known, local, tables)
         except ValueError as error:
             raise ValueError(f"force = '{text}': {error}") from None
-
-
-def _lookup(name: str, one: LookupTable) -> Lookup:
-    of, value = [si(unit_exponents(column.unit)) for column in one.of], si(unit_exponents(one.value.unit))
-    return Lookup(name, tuple(of), value)
 
 
 def check_formulas(scene: Any) -> None:

@@ -1,8 +1,8 @@
 """Expressions of contact laws, in the form from which kernels are composed: structure as text, named values separately.
 
 The text is the expression in postfix order, behind "expression", separated by commas: ``x0`` is its first variable,
-``c0`` its first named value, ``^1.5`` a power; other numbers are written out. Laws that differ in values only have the
-same text, and share compiled code.
+``c0`` its first named value, ``^1.5`` a power, ``T0:5:4`` its first table (`scene.formulas`); other numbers are written
+out. Laws that differ in values only have the same text, and share compiled code.
 """
 
 from collections.abc import Mapping
@@ -13,6 +13,7 @@ from pydantic import Field
 
 from flexclear.scene.expression import (
     Local,
+    Lookup,
     check_unit,
     constants_of,
     fold,
@@ -22,24 +23,52 @@ from flexclear.scene.expression import (
 )
 from flexclear.scene.fields import Number, Part
 from flexclear.scene.laws import Value
+from flexclear.scene.tables import LookupTable
 
 #: variables of the normal force, at the end of an angle too, and of a coefficient of friction
 NORMAL = {"depth": Local("x0", "m"), "rate": Local("x1", "m/s"), "impact_rate": Local("x2", "m/s")}
 ANGULAR = {"depth": Local("x0", "rad"), "rate": Local("x1", "rad/s"), "impact_rate": Local("x2", "rad/s")}
 SLIDING = {"slip": Local("x0", "m/s"), "normal_force": Local("x1", "N")}
 #: most named values of an expression for a normal force, and of one for a coefficient of friction
-MOST_NORMAL, MOST_SLIDING = 10, 6
+MOST_NORMAL, MOST_SLIDING = 12, 6
 
 
-def encoded(text: str, values: Mapping[str, Any], variables: Mapping[str, Local]) -> tuple[str, tuple[float, ...]]:
+#: tables of an expression as keys of a cache: each as a function, and how often its intervals are halved
+Functions = tuple[tuple[Lookup, tuple[int, ...]], ...]
+
+
+class _Law(Part):
+    """Keys of all laws by an expression."""
+
+    values: dict[str, Value] = Field(default_factory=dict)
+    """named constants of the expression, each a number or text with its unit"""
+    tables: dict[str, LookupTable] = Field(default_factory=dict)
+    """named tables: ``table(NAME, ...)`` is the value of `tables.NAME` there"""
+
+    @property
+    def functions(self) -> Functions:
+        """Tables as functions."""
+        return tuple((one.function(name), one.levels()) for name, one in self.tables.items())
+
+
+def encoded(
+    text: str, values: Mapping[str, Any], variables: Mapping[str, Local], tables: Functions = ()
+) -> tuple[str, tuple[float, ...]]:
     """Return structure and values of an expression, whose units `check` checks; raise ValueError for no expression."""
-    return _encoded(text, tuple(values.items()), tuple(variables.items()))[:2]
+    return _encoded(text, tuple(values.items()), tuple(variables.items()), tables)[:2]
 
 
-def check(key: str, text: str, values: Mapping[str, Any], variables: Mapping[str, Local], dimension: str) -> None:
+def check(
+    key: str,
+    text: str,
+    values: Mapping[str, Any],
+    variables: Mapping[str, Local],
+    dimension: str,
+    tables: Functions = (),
+) -> None:
     """Raise ValueError, in words, for an expression without meaning or of another dimension than its law."""
     try:
-        _, numbers, steps = _encoded(text, tuple(values.items()), tuple(variables.items()))
+        _, numbers, steps = _encoded(text, tuple(values.items()), tuple(variables.items()), tables)
         check_unit(steps, dimension)
     except ValueError as error:
         raise ValueError(f"{key} = '{text}': {error}") from None
@@ -50,11 +79,13 @@ def check(key: str, text: str, values: Mapping[str, Any], variables: Mapping[str
 
 @lru_cache(maxsize=256)
 def _encoded(
-    text: str, given: tuple[tuple[str, Any], ...], variables: tuple[tuple[str, Local], ...]
+    text: str, given: tuple[tuple[str, Any], ...], variables: tuple[tuple[str, Local], ...], tables: Functions
 ) -> tuple[str, tuple[float, ...], tuple[Any, ...]]:
     known = dict(variables)
     constants = constants_of({name: value for name, value in given if name != "restitution"}, (*known, "restitution"))
     require_used(constants, (text,))
+    names = [one.name for one, _ in tables]
+    require_used(names, (text,), "tables")
     constants |= {name: (float(value), "1") for name, value in given if name == "restitution"}
 
     def variable(name: str) -> Local:
@@ -63,7 +94,7 @@ def _encoded(
             raise ValueError(f"'{name}' is unknown: a contact law depends on its own contact alone, here on {more}")
         return known[name]
 
-    steps = postfix(text, variable, constants)
+    steps = postfix(text, variable, constants, {one.name: one for one, _ in tables})
     for step in steps:
         refuse_jump(step)
     places = {id(one): f"c{k}" for k, one in enumerate(constants.values())}
@@ -71,7 +102,10 @@ def _encoded(
     def leaf(step: Any) -> str:
         return step.letter if isinstance(step, Local) else places.get(id(step), repr(step[0]))
 
-    def apply(operator: str, operands: list[str]) -> str:
+    def apply(operator: Any, operands: list[str]) -> str:
+        if isinstance(operator, Lookup):
+            k = names.index(operator.name)
+            return ",".join([*operands, ":".join([f"T{k}", *map(str, tables[k][1])])])
         if operator == "^" and operands[1][0] != "c":
             return f"{operands[0]},^{operands[1]}"
         return ",".join([*operands, operator])
@@ -79,7 +113,7 @@ def _encoded(
     return f"expression,{fold(steps, leaf, apply)}", tuple(value for value, _ in constants.values()), tuple(steps)
 
 
-class NormalExpression(Part):
+class NormalExpression(_Law):
     """A law of one's own: the normal force as an expression, which is never negative where the run uses it.
 
     Variables are the penetration `depth`, its rate, and `impact_rate`, the rate at which this contact began. What the
@@ -89,8 +123,6 @@ class NormalExpression(Part):
     law: Literal["expression"]
     force: str
     """the expression, as ``K*depth^1.5*(1 + a*rate/impact_rate)``"""
-    values: dict[str, Value] = Field(default_factory=dict)
-    """named constants of the expression, each a number or text with its unit"""
     restitution: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
     """restitution that the damping is meant to cause; the expression may contain it"""
 
@@ -106,7 +138,7 @@ class NormalExpression(Part):
     @property
     def encoded(self) -> tuple[str, tuple[float, ...]]:
         """Structure and values of the expression (`encoded`)."""
-        return encoded(self.force, self.named, NORMAL)
+        return encoded(self.force, self.named, NORMAL, self.functions)
 
     @property
     def kind(self) -> str:
@@ -116,22 +148,20 @@ class NormalExpression(Part):
     def check(self, *, turning: bool = False) -> None:
         """Raise ValueError, in words, for an expression without meaning. turning: for the end of an angle."""
         variables, dimension = (ANGULAR, "torque") if turning else (NORMAL, "force")
-        check("normal.force", self.force, self.named, variables, dimension)
+        check("normal.force", self.force, self.named, variables, dimension, self.functions)
 
 
-class FrictionExpression(Part):
+class FrictionExpression(_Law):
     """A law of one's own: the coefficient of friction as an expression of the sliding speed and the normal force."""
 
     law: Literal["expression"]
     coefficient: str
     """the expression of `slip` and `normal_force`, zero at rest, as ``mu*tanh(slip/v)``"""
-    values: dict[str, Value] = Field(default_factory=dict)
-    """named constants of the expression, each a number or text with its unit"""
 
     @property
     def encoded(self) -> tuple[str, tuple[float, ...]]:
         """Structure and values of the expression (`encoded`)."""
-        return encoded(self.coefficient, self.values, SLIDING)
+        return encoded(self.coefficient, self.values, SLIDING, self.functions)
 
     @property
     def kind(self) -> str:
@@ -140,4 +170,4 @@ class FrictionExpression(Part):
 
     def check(self) -> None:
         """Raise ValueError, in words, for an expression without meaning."""
-        check("friction.coefficient", self.coefficient, self.values, SLIDING, "number")
+        check("friction.coefficient", self.coefficient, self.values, SLIDING, "number", self.functions)

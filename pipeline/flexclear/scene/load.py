@@ -427,7 +427,7 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
         wear = joint.get("wear") if isinstance(joint, dict) else None
         if isinstance(wear, dict) and isinstance(wear.get("profile"), str) and not wear.get("shapes"):
             wear["profile"] = str(wear["profile"] if Path(wear["profile"]).is_absolute() else absolute(wear["profile"]))
-    for law in _tables([table.get(family) for family in ("drive", "load", "event")]):
+    for law in _tables([table.get(family) for family in ("drive", "load", "event", "joint", "stop")]):
         if not Path(law["file"]).is_absolute():
             law["file"] = absolute(law["file"])
 

@@ -181,7 +181,7 @@ class _ByExpression(Part):
     values: dict[str, Value] = Field(default_factory=dict)
     """named constants, each a number or text with its unit"""
     tables: dict[str, LookupTable] = Field(default_factory=dict)
-    """named tables: ``table(damper, rail.velocity)`` is the value of `tables.damper` there"""
+    """named tables: ``table(NAME, ...)`` is the value of `tables.NAME` there"""
 
     @property
     def texts(self) -> tuple[str, ...]:

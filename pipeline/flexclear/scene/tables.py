@@ -1,14 +1,16 @@
-"""Tables of measured values over one or two quantities, which expressions of loads look up."""
+"""Tables of measured values over one or two quantities, which expressions of loads and contact laws look up."""
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from flexclear.scene.expression import Lookup
 from flexclear.scene.fields import Part
 from flexclear.scene.laws import Column, read_columns
-from flexclear.scene.units import unit
+from flexclear.scene.units import si, unit, unit_exponents
 
 #: largest number of points
 MOST_POINTS = 5_000
@@ -16,6 +18,11 @@ MOST_POINTS = 5_000
 
 def _as_tuple(value: Any) -> Any:
     return (value,) if isinstance(value, (dict, Column)) else value
+
+
+@lru_cache(maxsize=64)
+def _axes(points: tuple[tuple[float, ...], ...], count: int) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(sorted({row[k] for row in points})) for k in range(count))
 
 
 class LookupTable(Part):
@@ -79,9 +86,14 @@ class LookupTable(Part):
             )
         return self
 
-    def axes(self) -> list[list[float]]:
+    def function(self, name: str) -> Lookup:
+        """Return what an expression knows of the table under its name."""
+        of, value = (si(unit_exponents(column.unit)) for column in self.of), si(unit_exponents(self.value.unit))
+        return Lookup(name, tuple(of), value)
+
+    def axes(self) -> tuple[tuple[float, ...], ...]:
         """Return the values of each quantity in SI, ascending."""
-        return [sorted({row[k] for row in self.points}) for k in range(len(self.of))]
+        return _axes(self.points, len(self.of))
 
     def levels(self) -> tuple[int, ...]:
         """Return how often the intervals of each quantity are halved to find one."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from flexclear.dynamics.contact import restitution as closed_form
 from flexclear.dynamics.contact.form import FORMS
@@ -19,13 +19,13 @@ class Numbers(NamedTuple):
     """Numbers of a normal law for its form; CONTACT_NUMBERS has the same fields.
 
     stiffness: K [N/m^n].  damping: C [N s/m], or the hysteresis factor; 0 for a law without loss.  values: further ones
-    of the form.
+    of the form, then those of its tables.
     """
 
     stiffness: float
     exponent: float
     damping: float
-    values: tuple[float, ...] = (0.0,) * 12
+    values: tuple[Any, ...] = (0.0,) * 12
 
 
 @dataclass(frozen=True)

@@ -67,8 +67,8 @@ JOINT_FRICTION = Effect(
         "bearings": "joint kind law side axis bristle",
     },
     # radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per
-    # force along the axis and per moment about it; preload: constant normal force
-    numbers={"bearing_numbers": "radius lever axial torsion preload law:6"},
+    # force along the axis and per moment about it; preload: constant normal force; then the tables of their laws
+    numbers={"bearing_numbers": "radius lever axial torsion preload law:6", "bearing_tables": "value"},
     work={
         # unit: wrench of its friction on the joint's second body per normal force, about the mechanism's origin; loss:
         # lost power per normal force [m/s]

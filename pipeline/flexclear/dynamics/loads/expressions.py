@@ -7,8 +7,8 @@ from functools import reduce
 from operator import mul
 from typing import Any
 
+from flexclear.dynamics import lookup
 from flexclear.dynamics.loads.given import Given, line
-from flexclear.dynamics.loads.lookup import curve, surface
 from flexclear.dynamics.specialise import symbols
 from flexclear.dynamics.vectors import Vector, dot
 from flexclear.scene.expression import BENT, fold
@@ -62,7 +62,7 @@ def evaluated(
         if ":" in token:
             table, *levels = map(int, token[1:].split(":"))
             note(table, values)
-            return (curve, surface)[len(levels) - 1](given.tables[table], *levels, *values)
+            return lookup.at(given.tables[table], levels, values)
         exponent = int(token[1:]) if token[0] == "^" and token[1:] else 0
         if exponent:
             product = reduce(mul, values * abs(exponent))

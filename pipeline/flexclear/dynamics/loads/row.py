@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from flexclear.dynamics.loads import lookup
+from flexclear.dynamics import lookup
 from flexclear.scene.formulas import Formula
 from flexclear.scene.laws import Polynomial
 from flexclear.scene.units import quantity_at

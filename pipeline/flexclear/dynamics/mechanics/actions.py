@@ -8,17 +8,20 @@ from itertools import pairwise
 from typing import Any
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact.expression import sizes as law_sizes
+from flexclear.dynamics.contact.form.expression import sizes as form_sizes
 from flexclear.dynamics.contact.wear import LEDGER
 from flexclear.dynamics.loads import LOADS
 from flexclear.dynamics.loads.given import Law
-from flexclear.dynamics.loads.lookup import length
+from flexclear.dynamics.lookup import length
 from flexclear.dynamics.mechanics.contacts import stop, touch
 from flexclear.dynamics.mechanics.gears import coupling
 from flexclear.dynamics.mechanics.loads import act
 from flexclear.dynamics.mechanics.mechanism import Action, Carrier, Frame, Link, Rubbed, Rubbing
 from flexclear.dynamics.mechanics.tables import Tables
-from flexclear.dynamics.mechanics.trees import Site
+from flexclear.dynamics.mechanics.trees import Numbers, Site
 from flexclear.dynamics.routines.calls import MODES, RATES, SCENE, STATE, Cell, Span, cells
+from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.vectors import UNIT, ZERO
 
 #: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
@@ -36,6 +39,7 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
     parts, slot, made = tables.parts, tables.nq + tables.nv, list[Action]()
     wearing = tables.table(m.NAMED["worn"])
     worn = wearing["contact"].tolist()
+    look = _Looks(m.CONTACT_TABLES)
     wear0 = slot + tables.size(m.SIZES["wear_slot"])
     for c, row in enumerate(tables.table(m.CONTACTS)):
         numbers, closed, latched = (
@@ -45,6 +49,11 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
         )
         books = cells(RATES, slot + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c, m.CONTACT_LEDGER.size)
         results, form = [*tables.row(m.NAMED["touch"], c), *books], parts.forms[row["normal"]]
+        friction = parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
+        numbers = numbers._replace(
+            values=look.added(numbers.values, form_sizes(form)),
+            friction_law=look.added(numbers.friction_law, law_sizes(friction)),
+        )
         given: tuple[Any, ...]
         ends = [frames[row["outer"]], frames[row["inner"]]]
         if c < tables.size(m.N_SURFACES):
@@ -53,7 +62,7 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
                 profile = _profile(tables, wearing[worn.index(c)])
                 results += cells(RATES, wear0 + LEDGER.size * worn.index(c), LEDGER.size)
             bristle, rates = (cells(array, int(row["bristle"]), 3 * (row["bristle"] >= 0)) for array in (STATE, RATES))
-            laws = form, parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
+            laws = form, friction
             given = parts.surfaces[row["surfaces"]], laws, int(c in worn), profile, numbers, closed, latched, bristle
         else:
             which = [int(row[name]) for name in ("surfaces", "subtracted") if row[name] >= 0]
@@ -71,6 +80,19 @@ def _profile(tables: Tables, row: Any) -> tuple[Any, ...]:
     halvings = int(row["halvings"]), *([int(row["heights"])] * bool(row["heights"]))
     firsts = (tables.row(m.NAMED["profiles"], row[side])[0].index for side in ("outer0", "inner0"))
     return halvings, *(Span(SCENE, first) for first in firsts)
+
+
+class _Looks:
+    """Tables that laws look up, one after another in a table of f."""
+
+    def __init__(self, table: Any) -> None:
+        self.next = topologies.start(table.at)
+
+    def added(self, numbers: Numbers, sizes: Sequence[int]) -> list[Any]:
+        """Return the numbers of a law with a span for each of its tables, of these sizes."""
+        begins = [self.next + sum(sizes[:k]) for k in range(len(sizes))]
+        self.next += sum(sizes)
+        return [*numbers, *(Span(SCENE, at) for at in begins)]
 
 
 def _gauge(tables: Tables, k: int) -> tuple[Any, list[Cell], list[Cell]]:
@@ -166,12 +188,14 @@ def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[Any, tuple[Any, .
 def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
     """Return the friction of ideal joints, whose links are marked; carriers: the ground, then all links."""
     table, laws, made = tables.table, tables.parts.kinds("joint_friction"), list[Rubbing]()
+    look = _Looks(m.NAMED["bearing_tables"])
     slot, count = (tables.size(m.SIZES[name]) for name in ("joint_friction_slot", "n_bearings"))
     for k, row in enumerate(table(m.NAMED["rubbing"])):
         bearings = []
         for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
             one = table(m.NAMED["bearings"])[e]
             what, numbers = Bearing(*(int(one[name]) for name in Bearing._fields)), tables.record("bearing_numbers", e)
+            numbers = numbers._replace(law=look.added(numbers.law, law_sizes(laws[one["law"]])))
             bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
             bends, (load, *rest) = tables.row(m.NAMED["bends"], e), tables.row(m.NAMED["bearing"], e)
             given, record = (what, laws[one["law"]], numbers, bristle), rest if tables.recorded else []

@@ -11,6 +11,8 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact.conforming import CONFORMING
+from flexclear.dynamics.contact.expression import numbers_of
+from flexclear.dynamics.contact.form.expression import VALUES
 from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.friction.expression import check
 from flexclear.dynamics.contact.normal import NORMAL_LAWS, expression
@@ -53,12 +55,13 @@ def _check_friction(name: str, friction: Any) -> None:
 def fill(
     numbering: Numbering, parts: Parts, laws: Sequence[Resolved], site_pairs: SitePairs, gauges: Gauges, slot: int
 ) -> dict[Any, Any]:
-    """Return the tables CONTACTS and CONTACT_NUMBERS.
+    """Return the tables CONTACTS, CONTACT_NUMBERS and CONTACT_TABLES.
 
     site_pairs: (outer, inner) sites of each contact.  gauges: receives those of the stops.  slot: ledger index of the
     first bristles.
     """
     mechanism, rows, reals, first = numbering.mechanism, [], [], numbering.nq + numbering.nv + slot
+    looked_up = list[float]()
     for contact, law, sites in zip(mechanism.contacts, laws, site_pairs, strict=True):
         name, joint, *_ = contact
         length = mechanism.components.lengths[part_of(mechanism, contact)]
@@ -81,8 +84,9 @@ def fill(
         rows.append((*sites, *kinds_of, first if bends else -1, subtracted))
         first += 3 * bends
         sizes = (joint.clearance, joint.arm, _floor(joint, length))
-        reals.append([*sizes, stick, *law.numbers[:3], *law.numbers.values, *numbers, *shape, length])
-    return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
+        reals.append([*sizes, stick, *law.numbers[:3], *law.numbers.values[:VALUES], *numbers, *shape, length])
+        looked_up += [x for one in (*law.numbers.values[VALUES:], *numbers_of(joint.friction)) for x in one]
+    return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals, m.CONTACT_TABLES: looked_up}
 
 
 def start_centre(mechanism: Mechanism, contact: Contact) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.contact.expression import numbers_of
 from flexclear.dynamics.effects.declared import BEARINGS, SLIDER
 from flexclear.dynamics.model.components import Floors, Group
 from flexclear.dynamics.model.contacts import bristle, friction_law
@@ -64,6 +65,7 @@ def fill(filling: Filling) -> dict[str, Any]:
             law = laws.index(joint.friction.kind) if joint.friction is not None else -1
             tables["bearings"].append((number, kind, law, side, axis, slot if size is not None else -1))
             tables["bearing_numbers"].append(_numbers(name, joint, kind))
+            tables["bearing_tables"] += [x for one in numbers_of(joint.friction) for x in one]
             slot += 3 if size is not None else 0
     return tables
 

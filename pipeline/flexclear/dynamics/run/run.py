@@ -132,7 +132,7 @@ def maker(
     """
     alike = None if known is None or not _may_serve(known, scene) else refill_model(known.model, scene)
     if known is not None and alike is not None:
-        same = partial(assemble, alike, known.entry, known.method, known.mobility, type(known))
+        same = partial(assemble, alike, known.entry, known.method, known.mobility)
         return lambda name="", tell=progress: maker(scene, bundles, tell)(name) if name else same()
     posed, choice = with_start_state(scene, bundles, progress)
     moved, given = with_driven_actuators(posed, bundles, progress)

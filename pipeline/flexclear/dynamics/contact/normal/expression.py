@@ -7,18 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from itertools import product
+from itertools import pairwise, product
+from math import nan
 from typing import Any
 
 import numpy as np
 
-from flexclear.dynamics.contact.expression import composed, zeros
-from flexclear.dynamics.contact.form.expression import KINKS, form_of
+from flexclear.dynamics.contact.expression import Look, composed, left, numbers_of, zeros
+from flexclear.dynamics.contact.form.energy import integral
+from flexclear.dynamics.contact.form.expression import VALUES, form_of, pieces
 from flexclear.dynamics.contact.law import RESTITUTION_ERROR, Numbers, Resolved
+from flexclear.dynamics.lookup import NOWHERE
 from flexclear.scene.law_expressions import NormalExpression
 
-#: most kinks of the elastic force, and a penetration that none reaches
-MOST_KINKS, NEVER = 2, 1e300
 #: approach speeds of the free impacts that are tried [m/s or rad/s], the reported one in the middle
 SPEEDS = (0.01, 0.1, 1.0)
 #: excess of a rebound over the approach that is an error of its computation
@@ -30,20 +31,16 @@ def resolve(law: NormalExpression, mass: float | None, reach: float) -> Resolved
 
     mass: that rebounds, if known.  reach: largest penetration that a contact may have [m or rad].
     """
-    kind, values = law.encoded
-    whole, text = composed(kind), f"force = '{law.force}'"
-    damped = _damped(whole, values, reach, text)
+    kind, constants = law.encoded
+    text, looked_up = f"force = '{law.force}'", numbers_of(law)
+    values = *(*constants, *(0.0,) * VALUES)[:VALUES], *looked_up
+    damped = _damped(law, values, reach, text)
     if law.restitution not in (None, 1.0) and not damped:
         raise ValueError(
             f"{text} has no damping, as it does not depend on rate, but a restitution of {law.restitution:g} is asked; "
             "give it a damping, or leave out restitution"
         )
-    bends = kinks(kind, values, reach)
-    if len(bends) > MOST_KINKS:
-        raise ValueError(f"{text} has {len(bends)} kinks at rest, at most {MOST_KINKS}: write fewer max, min and abs")
-    numbers = Numbers(
-        0.0, 1.0, float(damped), ((*values, *(0.0,) * KINKS)[:KINKS] + (*bends, NEVER, NEVER)[:MOST_KINKS])
-    )
+    numbers = Numbers(0.0, 1.0, float(damped), (*values[:VALUES], *_pieces(law, values, reach, text), *looked_up))
     found = [rebound(kind, numbers.values, 1.0 if mass is None else mass, speed) for speed in SPEEDS]
     for speed, e in zip(SPEEDS, found, strict=True):
         if e > 1.0 + ROUNDING:
@@ -52,7 +49,9 @@ def resolve(law: NormalExpression, mass: float | None, reach: float) -> Resolved
                 "is positive where rate is"
             )
     delivered = found[1] if damped else 1.0
-    known = mass is not None or abs(rebound(kind, numbers.values, 10.0, SPEEDS[1]) - delivered) < ROUNDING
+    known = delivered == delivered and (
+        mass is not None or abs(rebound(kind, numbers.values, 10.0, SPEEDS[1]) - delivered) < ROUNDING
+    )
     warning = None
     if known and law.restitution is not None and abs(delivered - law.restitution) > RESTITUTION_ERROR:
         warning = (
@@ -62,17 +61,26 @@ def resolve(law: NormalExpression, mass: float | None, reach: float) -> Resolved
     return Resolved(kind, numbers, law.restitution, delivered if known else None, warning)
 
 
-def _damped(whole: Callable, values: tuple[float, ...], reach: float, text: str) -> bool:
-    """Return whether the force depends on the rate; raise ValueError for a force that pulls, or is no number."""
-    damped = False
+def _damped(law: NormalExpression, values: tuple[Any, ...], reach: float, text: str) -> bool:
+    """Return whether the force depends on the rate; raise ValueError for a force that pulls, or is no number.
+
+    States that its tables do not have are left out, but for depth and rate zero, at which each contact ends.
+    """
+    whole, damped = composed(law.kind), False
+    if start := left(law, 0.0, 0.0, SPEEDS[1], values):
+        raise ValueError(f"{text} has no value at depth = 0 at rest: {start}")
     with np.errstate(all="ignore"):
         for depth in (0.0, *(reach * np.geomspace(1e-7, 1.0, 29)).tolist()):
+            if left(law, depth, 0.0, SPEEDS[1], values):
+                break
             at_rest = [float(whole(np.float64(depth), np.float64(0.0), v, values)) for v in SPEEDS]
             if at_rest[0] < 0.0:
                 raise ValueError(f"{text} pulls: it is {at_rest[0]:.4g} N at rest at depth = {depth:.3g}")
             if max(at_rest) - min(at_rest) > 1e-9 * max(at_rest):
                 raise ValueError(f"{text} depends on impact_rate at rest (rate = 0), where the contact stores energy")
             for v, share in product(SPEEDS, (1.0, -0.5)):
+                if left(law, depth, share * v, v, values):
+                    continue
                 force = float(whole(np.float64(depth), np.float64(share * v), v, values))
                 if not np.isfinite(force) or not np.isfinite(at_rest[0]):
                     raise ValueError(f"{text} is no number at depth = {depth:.3g}, rate = {share * v:g}")
@@ -80,16 +88,39 @@ def _damped(whole: Callable, values: tuple[float, ...], reach: float, text: str)
     return damped
 
 
-def kinks(kind: str, values: tuple[float, ...], reach: float) -> list[float]:
-    """Return the penetrations up to `reach` at which the slope of the elastic force jumps."""
-    bends = list[Callable]()
-    composed(kind, bends)
-    return zeros(bends, 1e-7 * reach, 10.0 * reach, 0.0, 1.0, values)
+def kinks(law: NormalExpression, values: tuple[Any, ...], reach: float) -> list[float]:
+    """Return the penetrations up to some `reach` at which a derivative of the elastic force jumps."""
+    bends, looks, at = list[Callable](), list[Look](), (1e-7 * reach, 10.0 * reach, 0.0, 1.0, values)
+    composed(law.kind, bends, looks)
+    found, tables = set(zeros(bends, *at)), list(law.tables.values())
+    for number, operands in looks:
+        for axis, operand in zip(tables[number].axes(), operands, strict=True):
+            if all(operand(x, *at[2:]) == x for x in axis):  # depth itself
+                found |= {x for x in axis if x > 0.0}
+            else:
+                found |= set(zeros([operand], *at, levels=axis))
+    return sorted(found)
+
+
+def _pieces(law: NormalExpression, values: tuple[Any, ...], reach: float, text: str) -> tuple[tuple[float, ...], ...]:
+    """Return where pieces of the elastic force begin, then the energies stored there; none without kinks."""
+    levels = pieces(law.kind)
+    starts, count = [0.0, *kinks(law, values, reach)], 1 << levels
+    if len(starts) > count:
+        raise ValueError(f"{text} has {len(starts) - 1} kinks at rest, at most {count - 1}: write a simpler expression")
+    if not levels:
+        return ()
+    whole, energies = composed(law.kind), [0.0]
+    over = integral(lambda depth, _: whole(depth, 0.0, 1.0, values))
+    for begin, end in pairwise(starts):
+        energies.append(energies[-1] + float(over(begin, end, None)))
+    room = count - len(starts)
+    return ((*starts, *(NOWHERE,) * room, *energies, *(0.0,) * room),)
 
 
 @lru_cache(maxsize=1024)
-def rebound(kind: str, values: tuple[float, ...], mass: float, speed: float) -> float:
-    """Return rebound over approach speed of a free impact, to some four digits.
+def rebound(kind: str, values: tuple[Any, ...], mass: float, speed: float) -> float:
+    """Return rebound over approach speed of a free impact, to some four digits; nan where it leaves a table.
 
     Runge-Kutta steps of a fraction of the time that an elastic impact of this speed takes.
     """
@@ -103,7 +134,7 @@ def rebound(kind: str, values: tuple[float, ...], mass: float, speed: float) -> 
     h, d, v, before = 0.02 * deepest / speed, np.float64(0.0), np.float64(speed), (0.0, speed)
 
     def slope(d: Any, v: Any) -> Any:
-        return -max(0.0, whole(max(0.0, d), v, speed, values)) / mass
+        return -max(whole(max(0.0, d), v, speed, values), 0.0) / mass
 
     for _ in range(5_000):
         k1 = slope(d, v)
@@ -112,6 +143,8 @@ def rebound(kind: str, values: tuple[float, ...], mass: float, speed: float) -> 
             share = before[0] / (before[0] - pull) if before[0] > pull else 1.0  # of the step in which the force ended
             return float(-(before[1] + share * (v - before[1])) / speed)
         before = (-k1, v)
+        if k1 != k1:
+            return nan
         k2 = slope(d + 0.5 * h * v, v + 0.5 * h * k1)
         k3 = slope(d + 0.5 * h * v + 0.25 * h * h * k1, v + 0.5 * h * k2)
         k4 = slope(d + h * v + 0.5 * h * h * k2, v + h * k3)

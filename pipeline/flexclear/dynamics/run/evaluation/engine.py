@@ -252,7 +252,7 @@ class Engine:
 
     def explained(self) -> str | None:
         """Reason for which an effect, or a table, ends the run; None when none does."""
-        explains = [*self.model.parts.functions(EXPLANATIONS), table_ranges.explanation]
+        explains = [table_ranges.explanation, *self.model.parts.functions(EXPLANATIONS)]
         reasons = (explain(self) for explain in explains)
         return next((why for why in reasons if why is not None), None)
 

@@ -1,40 +1,51 @@
-"""Explanation of a run that ends where the expression of a load leaves its table."""
+"""Explanation of a run that ends where the expression of a load or a contact law leaves its table."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.loads.lookup import ROUNDING
-from flexclear.scene.expression import Lookup
-from flexclear.scene.formulas import expressions_of_load, formula
+from flexclear.dynamics.contact.expression import left, numbers_of
+from flexclear.dynamics.effects.declared import BEARINGS
+from flexclear.dynamics.lookup import left as left_by
+from flexclear.scene.formulas import formula
 
 
 def explanation(engine: Any) -> str | None:
-    """Return table, quantity and value for the first load that leaves a table in the state evaluated last."""
+    """Return table, quantity and value for the first part that leaves a table in the state evaluated last."""
+    return next(_explanations(engine), None)
+
+
+def _explanations(engine: Any) -> Iterator[str]:
     scene = engine.model.scene
     for k, (name, _) in enumerate(engine.model.loads):
         load: Any = scene.load.get(name)
-        known = formula(scene, name) if getattr(load, "tables", None) else None
-        if known is None:
-            continue
-        units = {
-            step.name: step.of
-            for _, steps in expressions_of_load(scene, load)
-            for step in steps
-            if isinstance(step, Lookup)
-        }
-        for number, values in _looked_up(engine, k):
-            called, table = list(load.tables.items())[number]
-            for column, unit, axis, value in zip(table.of, units[called], table.axes(), values, strict=True):
-                near = ROUNDING * (axis[-1] - axis[0])  # of the last state that can be evaluated
-                if not axis[0] + near < value < axis[-1] - near:
-                    what = column.column if isinstance(column.column, str) else f"column {column.column}"
-                    return (
-                        f"load {name}: {what} = {value:.6g} {unit} leaves table {called} ({table.file}), whose "
-                        f"points are at {axis[0]:.6g} to {axis[-1]:.6g} {unit}; add points, or limit it by max and min"
-                    )
-    return None
+        if getattr(load, "tables", None) and formula(scene, name) is not None:
+            for number, values in _looked_up(engine, k):
+                called, table = list(load.tables.items())[number]
+                if why := left_by(called, table, values):
+                    yield f"load {name}: {why}"
+    read = engine.model.contacts, engine.table(m.TOUCH), engine.modes, engine.latched
+    for (name, joint, *_), touch, closed, latched in zip(*read, strict=False):
+        pressed = max(0.0, -touch["gap"]), touch["rate"], max(latched, 1e-300)
+        laws = (joint.normal, pressed), (joint.friction, (touch["slip"], touch["normal_force"], 0.0))
+        yield from _left(f"contact {name}", laws if closed else ())
+    bearings = engine.table(m.NAMED["bends"])["sliding"] if scene.joints_with_friction() else ()
+    rubbing = [(name, joint) for name, joint in scene.joints_with_friction().items() for _ in BEARINGS[joint.type]]
+    for (name, joint), sliding in zip(rubbing, bearings, strict=True):
+        yield from _left(f"joint {name}", [(joint.friction, (np.linalg.norm(sliding), 1.0, 0.0))])
+
+
+def _left(where: str, laws: Any) -> Iterator[str]:
+    """Yield which table each law by an expression leaves at its variables."""
+    for law, variables in laws:
+        tables = numbers_of(law)
+        why = left(law, *map(float, variables), (*law.encoded[1], *tables)) if tables else None
+        if why:
+            yield f"{where}: {why}"
 
 
 def _looked_up(engine: Any, k: int) -> list[tuple[int, list[float]]]:

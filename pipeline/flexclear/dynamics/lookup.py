@@ -1,4 +1,4 @@
-r"""Tables in expressions of loads: the pieces of a spline, and how one is looked up.
+r"""Tables in expressions of loads and of contact laws: the pieces of a spline, and how one is looked up.
 
 The numbers of a table over one quantity with n halvings of its intervals: its upper bound, :math:`2^n` lower bounds of
 intervals, unused ones infinite, and four coefficients of each interval. Over two: both upper bounds, the lower bounds
@@ -8,20 +8,21 @@ Source: de Boor (1978), A Practical Guide to Splines, ch. IV and XVII (tensor pr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import nan, prod
 from typing import Any
 
 import numpy as np
 
 from flexclear.dynamics.specialise.intervals import NOWHERE, cubic, interval
-from flexclear.dynamics.specialise.symbols import Indexed, select, smaller
+from flexclear.dynamics.specialise.symbols import select, smaller
 from flexclear.scene.tables import LookupTable
 
 #: fraction of a table's range by which rounding may pass its ends
 ROUNDING = 1e-9
 
 
-def length(levels: tuple[int, ...]) -> int:
+def length(levels: Sequence[int]) -> int:
     """Return how many numbers a table has with these halvings."""
     sizes = [2**n for n in levels]
     return len(levels) + sum(sizes) + 4 ** len(levels) * prod(sizes)
@@ -54,14 +55,14 @@ def _pieces(x: np.ndarray, y: np.ndarray, between: str) -> np.ndarray:
     return np.stack([y[:-1], slope, 0.0 * slope, 0.0 * slope], axis=1)
 
 
-def curve(numbers: Indexed, n: int, x: Any) -> Any:
+def curve(numbers: Any, n: int, x: Any) -> Any:
     """Return the value at x of a table over one quantity with n halvings of its intervals."""
     i = interval(numbers, 1, n, x)
     value = cubic(numbers, 1 + (1 << n) + 4 * i, x - numbers[1 + i])
     return within(numbers, 1, 0, x, value)
 
 
-def surface(numbers: Indexed, n: int, m: int, x: Any, y: Any) -> Any:
+def surface(numbers: Any, n: int, m: int, x: Any, y: Any) -> Any:
     """Return the value at x and y of a table over two quantities."""
     along, across = 2, 2 + (1 << n)
     i, j = interval(numbers, along, n, x), interval(numbers, across, m, y)
@@ -72,7 +73,26 @@ def surface(numbers: Indexed, n: int, m: int, x: Any, y: Any) -> Any:
     return within(numbers, along, 0, x, within(numbers, across, 1, y, value))
 
 
-def within(numbers: Indexed, first: int, upper: int, x: Any, value: Any) -> Any:
+def within(numbers: Any, first: int, upper: int, x: Any, value: Any) -> Any:
     """Return a value, not a number where x is outside of the table: this ends the run."""
     low, high = numbers[first], numbers[upper]
     return select(smaller(x - low, high - x) + ROUNDING * (high - low) < 0.0, nan, value)
+
+
+def left(name: str, table: LookupTable, values: Sequence[float]) -> str | None:
+    """Return in words which quantity of a table is outside of its points; None if none is."""
+    one = table.function(name)
+    for column, unit, axis, value in zip(table.of, one.of, table.axes(), values, strict=True):
+        near = 0.5 * ROUNDING * (axis[-1] - axis[0])  # the last state that can be evaluated is farther out
+        if not axis[0] - near <= value <= axis[-1] + near:
+            what = column.column if isinstance(column.column, str) else f"column {column.column}"
+            return (
+                f"{what} = {value:.6g} {unit} leaves table {name} ({table.file}), whose "
+                f"points are at {axis[0]:.6g} to {axis[-1]:.6g} {unit}; add points, or limit it by max and min"
+            )
+    return None
+
+
+def at(numbers: Any, levels: Sequence[int], values: Sequence[Any]) -> Any:
+    """Return the value of a table over one or two quantities."""
+    return (curve, surface)[len(levels) - 1](numbers, *levels, *values)
