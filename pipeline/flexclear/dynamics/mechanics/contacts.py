@@ -108,7 +108,7 @@ def stop(
     N, taken, stored = law
     wrench = first.unit * (-sense * N)
     force = wrench.moment if gauges[0].turning else wrench.force
-    wrenches = on_both(ends[:2], sites[1], wrench)
+    wrenches: tuple[Wrench, ...] = on_both(ends[:2], sites[1], wrench)
     for other in others:
         wrenches = *wrenches, *on_both(ends[2:], sites[3], other.unit * (ratio * sense * N))
     counted = [one.rate for one, before in zip((first, *others), turns, strict=True) for _ in before]
