@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from benchmarks.rigid_slider import rigid_heights
 from flexclear.dynamics.linear.clearance_response import bounds
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.run.run import integrate
@@ -20,7 +21,7 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, impacts
 from tests.properties.mechanisms import LEAN, Table, frame, joint, matrix, rigid, scene, simulate, simulated, turned
-from tests.reference.sliders import corners, final_state, rigid_heights, rims
+from tests.reference.sliders import corners, final_state, rims
 
 MASS, INERTIA = 0.5, [6e-4, 4e-4, 2e-4]
 LENGTH, HEIGHT, WIDTH, GAP, SIDE = 0.1, 0.04, 0.06, 1e-3, 0.8e-3
