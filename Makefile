@@ -66,7 +66,7 @@ interpreters: $(TOOLS) ## A short run under every other Python, with the lowest 
 	@echo "-- plain numba"; FLEXCLEAR_PLAIN_NUMBA=1 FLEXCLEAR_KERNELS=$(VENV)/others/plain $(RUN) -m pytest -q $(CORE)
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
-	$(RUN) -m benchmarks evaluation peers runs commands cold growth ensembles exudyn
+	$(RUN) -m benchmarks evaluation peers runs commands cold growth ensembles exudyn siconos
 
 chaos: $(READY) ## Periodic or chaotic, with evidence: docs/chaos.md (an hour; keeps every scene that is finished)
 	@$(RUN) -m flexclear sections sps4/csj $(foreach d,sps4 sps4/damped,$(d)/far_csj_free $(d)/far_csj_fixed $(d)/far_csj_cb) --page docs/chaos.md

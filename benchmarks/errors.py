@@ -122,7 +122,7 @@ def converged(here: Mechanism, body: str, horizon: float, sampling: float = SAMP
         within = np.minimum(times, here.scene.time.end)
         rows = integrate(engine, start, silent, outputs=within).rows
         k = np.searchsorted(rows[:, 0], within - 1e-6 * sampling)  # rows of events lie in between
-        return _sensed(engine, rows[k], body)
+        return sensed(engine, rows[k], body)
 
     return Reference(_regular(_run(finest), body, sampling), horizon, sampling, at)
 
@@ -156,7 +156,7 @@ def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> 
 
     def alike() -> Samples:
         rows = integrate(engine, start, silent).rows
-        return _sensed(engine, rows[_sampled(rows[:, 0], reference.sampling)], body)
+        return sensed(engine, rows[_sampled(rows[:, 0], reference.sampling)], body)
 
     def whole() -> float:
         return once(lambda: observe_run(engine, integrate(engine, start, silent)))
@@ -174,7 +174,7 @@ def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> 
     )
 
 
-def _sensed(engine: Engine, rows: np.ndarray, body: str) -> Samples:
+def sensed(engine: Engine, rows: np.ndarray, body: str) -> Samples:
     """Return position and velocity of a rigid body's centre of mass from the rows that the integration recorded."""
     model = engine.model
     link = model.mechanism.link_of[body]

@@ -9,6 +9,7 @@ NAMES = {
     "ensembles": "ensembles:FAMILY",
     "peers": "peers:FAMILY",
     "exudyn": "exudyn:FAMILY",
+    "siconos": "siconos:FAMILY",
     "integrators": "integrators:FAMILY",
     "accuracy": "accuracy:FAMILY",
     "solids": "solids:FAMILY",

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
+from benchmarks.rigid_slider import rigid_heights
 from flexclear.dynamics.contact.surfaces.ball_on_strip import separation
 from flexclear.dynamics.linear.clearance_response import bounds
 from flexclear.dynamics.model.mechanism import build
@@ -23,7 +24,7 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, impacts
 from tests.properties.mechanisms import LEAN, Table, frame, joint, matrix, rigid, scene, simulate, simulated, turned
-from tests.reference.sliders import corners, final_state, rigid_heights
+from tests.reference.sliders import corners, final_state, rims
 
 
 class Sizes(NamedTuple):

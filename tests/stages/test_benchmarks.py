@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 from benchmarks import errors, log, page, processes, timing
 from benchmarks.errors import SAMPLING, Error, Samples
 from benchmarks.exudyn_model import METHODS, Outcome, holds_at_zero, joint_laws, polynomials, solve
-from benchmarks.families import exudyn, growth, runs
+from benchmarks.families import exudyn, growth, runs, siconos
 from benchmarks.family import Case
 from benchmarks.mechanisms import (
     Mechanism,
@@ -230,3 +232,30 @@ def test_the_logged_runs_of_the_peer_are_points_of_cost_studies():
         # in SI: some 10 um and some mm/s at the longest step
         assert 1e-8 < track["error"]["platform.position"][0] < 1e-4
         assert 1e-4 < track["error"]["platform.velocity"][0] < 1e-1
+
+
+def test_the_corners_that_siconos_sees_are_those_of_the_slider(tmp_path: Path) -> None:
+    """Gaps at a tilted pose by hand, and their slopes by differences of 1e-6 rad."""
+    library = tmp_path / "functions.so"
+    subprocess.run(
+        ["cc", "-O2", "-shared", "-fPIC", "-o", library, siconos.SCRIPT.with_suffix(".c"), "-lm"], check=True
+    )
+    functions, numbers = ctypes.CDLL(str(library)), ctypes.POINTER(ctypes.c_double)
+
+    def called(name: str, q: np.ndarray, length: int) -> np.ndarray:
+        result = np.zeros(length)
+        given = [np.ascontiguousarray(q).ctypes.data_as(numbers), ctypes.c_uint(2), result.ctypes.data_as(numbers)]
+        getattr(functions, name)(ctypes.c_uint(3), *given, ctypes.c_uint(0), None)
+        return result
+
+    q, step = np.array([0.4, -0.19, 0.02]), 1e-6 * np.eye(3)
+    for k, (x, side) in enumerate([(1, 1), (-1, 1), (1, -1), (-1, -1)]):
+        up = 0.153 * np.sin(0.4) + 0.306 * np.sin(-0.19) + x * 0.05 * np.sin(0.02) + side * 0.025 * np.cos(0.02)
+        assert called(f"gap{k}", q, 2)[0] == pytest.approx(0.026 - side * up, rel=1e-13)
+        differences = [(called(f"gap{k}", q + d, 2) - called(f"gap{k}", q - d, 2)) / 2e-6 for d in step]
+        assert called(f"slope{k}", q, 6).reshape(3, 2) == pytest.approx(np.array(differences), abs=1e-8)
+
+
+def test_without_siconos_there_are_no_records(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FLEXCLEAR_SICONOS", "/nowhere/python3")
+    assert siconos.measure(siconos.FAMILY.cases()[0]) == []
