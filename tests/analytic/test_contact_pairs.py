@@ -24,7 +24,7 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, impacts
 from tests.properties.mechanisms import LEAN, Table, frame, joint, matrix, rigid, scene, simulate, simulated, turned
-from tests.reference.sliders import corners, final_state, rims
+from tests.reference.sliders import corners, final_state
 
 
 class Sizes(NamedTuple):

@@ -6,7 +6,7 @@ r"""Two-node spatial beam elements: stiffness and mass of a rod of any section, 
                + \rho (I_z \dot\psi_v^2 + I_y \dot\psi_w^2 + 2I_{yz}\dot\psi_v\dot\psi_w)
 
 Without shear deformation (Euler-Bernoulli, Rayleigh) the section's slope is that of the axis, :math:`\psi = v'`,
-and deflections are Hermite cubics (see `kinematics`). Extension and twist are linear or quadratic in a
+and deflections are Hermite cubics (see below). Extension and twist are linear or quadratic in a
 cell. Sections that change along a cell are integrated at its Gauss points.
 Source: Wang & Wang (2019), sec. 3.2 (12-dof spatial beam elements); Przemieniecki (1968), ch. 5 and 11.
 
