@@ -74,8 +74,8 @@ def fill(
         if isinstance(joint, End):
             surfaces = gauges.add(*sites, joint.coordinate, counts=True)
             if contact.others:
-                of_first = (numbering.site(site) for site in contact.others)
-                subtracted = gauges.add(*of_first, joint.parts[1][1], counts=True)
+                a, b = (numbering.site(site) for site in contact.others)
+                subtracted = gauges.add(a, b, joint.parts[1][1], counts=True)
             shape = joint.limit + start_centre(mechanism, contact), joint.sense, joint.ratio
         else:
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape

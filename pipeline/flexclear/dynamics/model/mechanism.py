@@ -282,9 +282,8 @@ def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
 
 
 def _contacts(pairs: Mapping[str, Pair], at: Callable[[str], Site]) -> list[Contact]:
-    return [
-        Contact(name, pair.contact, *(_seated(name, at, *end) for end in pair.between)) for name, pair in pairs.items()
-    ]
+    seats = {name: [_seated(name, at, *end) for end in pair.between] for name, pair in pairs.items()}
+    return [Contact(name, pair.contact, seats[name][0], seats[name][1]) for name, pair in pairs.items()]
 
 
 def _seated(name: str, at: Callable[[str], Site], frame: str, seat: Seat) -> Site:

@@ -18,7 +18,8 @@ def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarra
         size, sites = -end.sense * seen.touch["normal_force"][:, c], [numbering.site(site) for site in (*both, *others)]
         for k, ((_, coordinate), factor) in enumerate(zip(end.parts, (1.0, -end.ratio), strict=False)):
             here = slice(2 * k, 2 * k + 2)
-            moment, force = coordinate.wrench(*(seen.sites[:, site] for site in sites[here]), factor * size)
+            a, b = (seen.sites[:, site] for site in sites[here])
+            moment, force = coordinate.wrench(a, b, factor * size)
             frames = zip(end.frames[here], (-1.0, 1.0), strict=True)
             acting += [(frame, sign * moment, sign * force) for frame, sign in frames]
     return acting
