@@ -108,7 +108,7 @@ class Touch:
             self.bent = random.uniform(0.0, 1.5e-6) * across / np.linalg.norm(across)
             bristle = (turned.T @ self.bent).tolist()
         form, latched = tables_of(laws).laws[0].form, random.uniform(0.01, 1.0)
-        given = laws[2], (form, laws[1] or ""), 0, numbers_of(laws), 1, latched, bristle
+        given = laws[2], (form, laws[1] or ""), 0, (), numbers_of(laws), 1, latched, bristle
         stored, wrenches, _ = touched(*given, *moving)
         #: moment about its centre, and force
         self.wrench = {name: np.ravel(one) for name, one in zip(self.centre, wrenches, strict=True)}

@@ -234,7 +234,8 @@ def test_a_vectors_size_counts_and_not_its_components() -> None:
 
 
 def test_listed_units_are_the_products_that_they_look_like(monkeypatch: pytest.MonkeyPatch) -> None:
-    for text in [text for text in UNITS if not text.isalpha() and text != "%"]:
+    # a thousandth of a pascal alone is no unit: it would hide a wrong letter of MPa
+    for text in [text for text in UNITS if not text.isalpha() and text not in ("%", "mPa s")]:
         listed = UNITS[text]
         with monkeypatch.context() as without:
             without.setattr(

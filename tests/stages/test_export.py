@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.artifacts.coordinates import as_table
+from flexclear.artifacts.recorded import as_table
 from flexclear.stages import export
 from flexclear.system.errors import InputError
 

@@ -54,7 +54,7 @@ class Priced:
         self.own, self.error = evaluations, error
 
     def variant(self, dropped: object) -> object:
-        return SimpleNamespace(contacts=dict, stop={})
+        return SimpleNamespace(contacts=dict, stops=dict)
 
     def point(self, dropped: object, *, integrator: str, evaluations: int = 10**9, **_: object) -> object:
         taken = 1000 if integrator == "dop853" else self.own
@@ -81,7 +81,7 @@ def test_a_plan_takes_the_scenes_own_integrator_where_that_does_as_well(
 def test_a_plan_that_is_not_cheaper_by_a_fifth_is_the_scene_as_it_is(evaluations: int, same: bool):
     """The planned run takes 1000 evaluations; that of the scene by its own method as many as given."""
     runs: Any = Priced(evaluations, 0.0)
-    runs.variant = lambda dropped: SimpleNamespace(contacts=lambda: {"pin": None}, stop={})
+    runs.variant = lambda dropped: SimpleNamespace(contacts=lambda: {"pin": None}, stops=dict)
     runs.part, runs.extent = lambda dropped: 0.5, SimpleNamespace(most=10**6)
     chosen = Chosen("dop853", 1e-6, {"bob.position": 1e-5})
     assert scene_is_cheaper(Search(runs, {"bob.position": 1e-2}), chosen) is same

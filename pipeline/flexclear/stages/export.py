@@ -35,7 +35,7 @@ def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",
     if target.suffix == ".nc":
         write_dataset(target, dataset)
         return
-    from flexclear.artifacts.coordinates import as_table
+    from flexclear.artifacts.recorded import as_table
 
     made: dict[str, Callable[[], bytes]] = {
         ".csv": lambda: as_table(dataset, rows).to_csv().encode(),

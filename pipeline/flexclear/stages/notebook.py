@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexclear.post.pages import small_picture
 
 if TYPE_CHECKING:
-    from flexclear.artifacts.coordinates import Recorded
+    from flexclear.artifacts.recorded import Recorded
 
 #: attributes of a run that say how it was computed, and their labels
 COST = {
@@ -30,7 +30,7 @@ DRAWN = 3
 
 def run_head(run: Recorded) -> str:
     """Return the head of a run that knows its scene, as HTML."""
-    from flexclear.artifacts.coordinates import scene_of
+    from flexclear.artifacts.recorded import scene_of
     from flexclear.post.overview.figures import watched_curves
 
     picture, time = watched_curves(run, scene_of(run).watched_quantities()[:DRAWN], width=6.0), run["time"].values

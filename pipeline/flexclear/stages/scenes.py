@@ -110,7 +110,7 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: a worker would run a caller's script again from its top
     (made,) = workplace.datasets(task, jobs=1)
-    from flexclear.artifacts.coordinates import with_dataframe
+    from flexclear.artifacts.recorded import with_dataframe
 
     return with_dataframe(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)), scene, run_head)
 

@@ -72,7 +72,7 @@ def start(scene: Scene, folder: Path | None = None) -> Start:
 
 def motion(run: xr.Dataset, folder: Path | None = None) -> Page:
     """Return the page of a run; write it where a folder is given.  Raises InputError for bodies that are not known."""
-    from flexclear.artifacts.coordinates import scene_of
+    from flexclear.artifacts.recorded import scene_of
     from flexclear.post.single_run.series import parameters
 
     scene, bodies = scene_of(run), parameters(run).get("body")

@@ -24,7 +24,6 @@ from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.observation import ROUNDING as CLOSED
 from flexclear.dynamics.run.evaluation.observation import observe_with, rows_of
-from flexclear.numerics.rotations import without_sign_jumps
 
 #: number of points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1
@@ -314,10 +313,5 @@ def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: 
         if not any(blurred(engine, side, clear) for side in rows):
             seen = observe_with(engine, rows, pieces, CLOSED)
             if not np.any(seen["status"]):
-                turned = seen["body_quaternion"].reshape(len(SIDES), -1, 4)
-                seen["body_quaternion"] = without_sign_jumps(turned).reshape(len(SIDES), -1)
-                limit = {name: WEIGHTS @ block for name, block in seen.items()}
-                mean = limit["body_quaternion"].reshape(-1, 4)
-                limit["body_quaternion"] = (mean / np.linalg.norm(mean, axis=1, keepdims=True)).ravel()
-                return limit
+                return {name: WEIGHTS @ block for name, block in seen.items()}
     return None
