@@ -95,7 +95,7 @@ def test_angles_reach_their_ends_beyond_a_full_turn(coordinate: str, ends: dict[
 
 def test_a_start_beyond_an_end_is_refused_unless_its_speed_is_given() -> None:
     place = ("stop.A.upper", "-20 mm")
-    with pytest.raises(InputError, match=r"(?s)stop\.A.*0\.02 m beyond -0\.02 m.*initial_approach_speed"):
+    with pytest.raises(InputError, match=r"(?s)stop\.A.*0\.02 m beyond -0\.02 m.*set upper to 0\.003 m"):
         run(STOPS, (place,))
     reported = run(STOPS, (place, ("stop.A.initial_approach_speed", "1 m/s"), ("time.end", "10 ms")))
     # from 20 mm deep, at 1 m/s

@@ -18,11 +18,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.numerics.rotations import skew
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from flexclear.artifacts.labelled import Labelled
 
 #: directions of a frame's motion, in its own axes

@@ -25,6 +25,6 @@ def as_html(scene: Any) -> str:
 def _in_words(name: str, part: Any) -> str:
     """Return a part's name, type and the frames, joints or body that it acts on, as in a table."""
     kind = getattr(part, "type", None) or getattr(getattr(part, "law", None), "type", "")
-    on = [getattr(part, key, None) for key in ("joint", "frame", "first", "second")]
+    on = [getattr(part, key, None) for key in (("first", "second") if hasattr(part, "first") else ("joint", "frame"))]
     sites = " – ".join([*getattr(part, "between", ()), *(str(one) for one in on if one)])
     return ": ".join(filter(None, [f"{name} ({kind})" if kind else name, sites]))

@@ -210,9 +210,9 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
     shown = principal(states)
     K = np.array([zero_one(component) for component in shown.T])
     lines = np.array([few_lines(component) for component in shown.T])
-    zero_one = float(np.nanmax(K)) if np.isfinite(K).any() else float("nan")
+    largest_K = float(np.nanmax(K)) if np.isfinite(K).any() else float("nan")
     discrete = float(lines.min())
-    kind, reasons = _rule(rate, least, after, distance, zero_one, discrete)
+    kind, reasons = _rule(rate, least, after, distance, largest_K, discrete)
     if len(states) < ENOUGH and kind != "periodic":
         kind, reasons = "undecided", (f"{len(states)} sections are too few, {ENOUGH} are needed", *reasons)
     numbers = {
@@ -220,7 +220,7 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
         "exponent_low": rate.low,
         "exponent_high": rate.high,
         "least_exponent": least,
-        "zero_one": zero_one,
+        "zero_one": largest_K,
         "returns_after": after,
         "return_distance": distance,
         "contraction": contraction(states, after or 1),
