@@ -192,5 +192,5 @@ def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size(found: 
 
 def test_runs_left_undone_are_named_with_their_reason():
     study = xr.Dataset(attrs={"undone": "rk4, step 1e-06 s"})
-    assert study.skipped_sentence(study) == ["Not run within the budget: rk4, step 1e-06 s."]
-    assert study.skipped_sentence(study.assign_attrs(undone="")) == []
+    assert cost_study.skipped_sentence(study) == ["Not run within the budget: rk4, step 1e-06 s."]
+    assert cost_study.skipped_sentence(study.assign_attrs(undone="")) == []
