@@ -13,7 +13,7 @@ from flexclear.artifacts.points import Point, join_points
 from flexclear.dynamics.kernels import INTERPRETED
 from flexclear.dynamics.record import point as points_of
 from flexclear.dynamics.record.point import Runner
-from flexclear.dynamics.run import alike
+from flexclear.dynamics.run import run as running
 from flexclear.dynamics.run.evaluation import batched_evaluation
 from flexclear.scene.load import load_scene, with_numbers
 from flexclear.scene.quantity import parse_recorded
@@ -165,13 +165,13 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
 def test_the_run_for_a_points_error_reuses_its_model(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One model is made from scratch, for the first run of the first point."""
     paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "2 ms"})
-    proper, made = alike.engines, list[float]()
+    proper, made = running.build, list[float]()
 
     def noted(scene: Scene, *rest: Any) -> Any:
         made.append(scene.solver.rtol)
         return proper(scene, *rest)
 
-    monkeypatch.setattr(alike, "engines", noted)
+    monkeypatch.setattr(running, "build", noted)
     worker = runner(paper, keep=("platform.velocity.largest",), error=True)
     for clearance in (3e-4, 4e-4):
         assert not worker.run(with_numbers(paper, {"joint.A1.clearance": clearance})).refused
