@@ -27,8 +27,8 @@ class Film(Part):
         height = USUAL_ROUGHNESS * clearance if self.roughness is None else self.roughness
         if not LEAST_ROUGHNESS * clearance <= height < clearance:
             raise ValueError(
-                f"film.roughness = {1e3 * height:g} mm must be below the clearance, {1e3 * clearance:g} mm, and at least "
-                f"{LEAST_ROUGHNESS:g} of it: at this thickness of the film the surfaces touch"
+                f"film.roughness = {1e3 * height:g} mm must be below the clearance, {1e3 * clearance:g} mm, and at "
+                f"least {LEAST_ROUGHNESS:g} of it: at this thickness of the film the surfaces touch"
             )
         return height
 
