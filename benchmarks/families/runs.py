@@ -222,7 +222,7 @@ def shown_evaluations(records: list[Record]) -> str:
             cells += [spread(ours, "us", 2), f"1/{ours['ratio']:.1f}"] if ours else ["", ""]
         rows.append(cells)
     head = ["scene", "n", "dgesv(n) [us]"]
-    for label in ("free", "in contact", "kernels, free", "kernels, in contact"):
+    for label in ("free", "in contact", "list, free", "list, in contact"):
         head += [f"{label} [us]", "of dgesv"]
     return f"{pipe_table(head, rows)}\n\n{records[-1]['case']}: n = {records[-1]['derivation']}."
 
