@@ -47,7 +47,7 @@ class _Law(Part):
 
     @property
     def functions(self) -> Functions:
-        """Tables as functions."""
+        """Each table as a function of its variables, with the halvings of its axes."""
         return tuple((one.function(name), one.levels()) for name, one in self.tables.items())
 
 

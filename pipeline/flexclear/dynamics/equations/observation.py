@@ -35,7 +35,7 @@ class Observed:
     friction (TOUCH, LOAD, BEARING).
     drive_force: along the drives' coordinates in the tree [N or N m].  energy: ENERGY, (rows, independent
     mechanisms).
-    jacobian: of the selected closure rows, as the kernels store it.
+    jacobian: of the selected closure rows, as routines store it.
     residual: largest residual of a closure, shape (rows,).  status: of the evaluation, shape (rows,).
     """
 

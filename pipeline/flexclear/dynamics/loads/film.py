@@ -186,7 +186,7 @@ def row(load: Squeeze, path: str) -> Row:
         12.0 * (radius / length) ** 2,
     ]
     if film.kind == "finite":
-        from flexclear.dynamics.loads.finite_film import fitted
+        from flexclear.dynamics.loads.finite_film import fit_ratios
 
-        numbers += fitted(radius / length, 0.5 * rough, ORDERS)
+        numbers += fit_ratios(radius / length, 0.5 * rough, ORDERS)
     return Row(frames=load.between, numbers=tuple(numbers))

@@ -22,7 +22,7 @@ MIDDLE = 1e-3
 
 
 @lru_cache(maxsize=64)
-def fitted(slenderness: float, least: float, orders: tuple[int, int]) -> list[float]:
+def fit_ratios(slenderness: float, least: float, orders: tuple[int, int]) -> list[float]:
     """Return the numbers that `film.ratios` takes.
 
     slenderness: radius over length.  least: least thickness over clearance.

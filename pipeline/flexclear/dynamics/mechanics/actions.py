@@ -39,7 +39,7 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
     parts, slot, made = tables.parts, tables.nq + tables.nv, list[Action]()
     wearing = tables.table(m.NAMED["worn"])
     worn = wearing["contact"].tolist()
-    look = _Looks(m.CONTACT_TABLES)
+    look = _LawTables(m.CONTACT_TABLES)
     wear0 = slot + tables.size(m.SIZES["wear_slot"])
     for c, row in enumerate(tables.table(m.CONTACTS)):
         numbers, closed, latched = (
@@ -51,8 +51,8 @@ def _contacts(tables: Tables, frames: list[Frame]) -> list[Action]:
         results, form = [*tables.row(m.NAMED["touch"], c), *books], parts.forms[row["normal"]]
         friction = parts.frictions[row["friction"]] if row["friction"] >= 0 else ""
         numbers = numbers._replace(
-            values=look.added(numbers.values, form_sizes(form)),
-            friction_law=look.added(numbers.friction_law, law_sizes(friction)),
+            values=look.with_spans(numbers.values, form_sizes(form)),
+            friction_law=look.with_spans(numbers.friction_law, law_sizes(friction)),
         )
         given: tuple[Any, ...]
         ends = [frames[row["outer"]], frames[row["inner"]]]
@@ -82,13 +82,13 @@ def _profile(tables: Tables, row: Any) -> tuple[Any, ...]:
     return halvings, *(Span(SCENE, first) for first in firsts)
 
 
-class _Looks:
+class _LawTables:
     """Tables that laws look up, one after another in a table of f."""
 
     def __init__(self, table: Any) -> None:
         self.next = topologies.start(table.at)
 
-    def added(self, numbers: Numbers, sizes: Sequence[int]) -> list[Any]:
+    def with_spans(self, numbers: Numbers, sizes: Sequence[int]) -> list[Any]:
         """Return the numbers of a law with a span for each of its tables, of these sizes."""
         begins = [self.next + sum(sizes[:k]) for k in range(len(sizes))]
         self.next += sum(sizes)
@@ -188,14 +188,14 @@ def gear(tables: Tables, frames: list[Frame], k: int) -> tuple[Any, tuple[Any, .
 def rubbing_of(tables: Tables, frames: list[Frame], carriers: Sequence[Carrier]) -> list[Rubbing]:
     """Return the friction of ideal joints, whose links are marked; carriers: the ground, then all links."""
     table, laws, made = tables.table, tables.parts.kinds("joint_friction"), list[Rubbing]()
-    look = _Looks(m.NAMED["bearing_tables"])
+    look = _LawTables(m.NAMED["bearing_tables"])
     slot, count = (tables.size(m.SIZES[name]) for name in ("joint_friction_slot", "n_bearings"))
     for k, row in enumerate(table(m.NAMED["rubbing"])):
         bearings = []
         for e in range(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"])):
             one = table(m.NAMED["bearings"])[e]
             what, numbers = Bearing(*(int(one[name]) for name in Bearing._fields)), tables.record("bearing_numbers", e)
-            numbers = numbers._replace(law=look.added(numbers.law, law_sizes(laws[one["law"]])))
+            numbers = numbers._replace(law=look.with_spans(numbers.law, law_sizes(laws[one["law"]])))
             bristle, rate = (cells(array, int(one["bristle"]), 3 * (one["bristle"] >= 0)) for array in (STATE, RATES))
             bends, (load, *rest) = tables.row(m.NAMED["bends"], e), tables.row(m.NAMED["bearing"], e)
             given, record = (what, laws[one["law"]], numbers, bristle), rest if tables.recorded else []

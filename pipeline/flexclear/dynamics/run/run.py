@@ -151,7 +151,7 @@ def maker(
 
 
 def _may_serve(known: Engine, scene: Scene) -> bool:
-    """Return True when the scene uses the same kernels, needs no preceding run, and has an ordinary start."""
+    """Return True when the scene uses the same compiled functions, needs no preceding run, and starts ordinarily."""
     old = known.model.scene
     paths = any(isinstance(drive, PathDrive) for drive in [*old.drive.values(), *scene.drive.values()])
     return not paths and scheme_of(scene.solver) == scheme_of(old.solver) and not known.mobility.singular_start

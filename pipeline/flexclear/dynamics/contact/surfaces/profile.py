@@ -59,10 +59,11 @@ def numbers(depths: np.ndarray) -> tuple[tuple[int, ...], list[float]]:
         axes.append(heights)
     else:
         values = values[..., 0]
-    return _packed(axes, values)
+    return _pack(axes, values)
 
 
-def _packed(axes: list[np.ndarray], values: np.ndarray) -> tuple[tuple[int, ...], list[float]]:
+def _pack(axes: list[np.ndarray], values: np.ndarray) -> tuple[tuple[int, ...], list[float]]:
+    """Return halvings of the axes, and the numbers of a profile: starts of intervals, then their polynomials."""
     halvings = tuple(levels(len(axis) - 1) for axis in axes)
     room = np.zeros([*(2**n for n in halvings), *([4] * len(axes))])
     room[tuple(slice(len(axis) - 1) for axis in axes)] = values
