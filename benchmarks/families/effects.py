@@ -62,15 +62,15 @@ def _measured(case: Case) -> list[Record]:
 
 def _influences() -> list[Record]:
     scene = edited(load_scene(scenes.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
-    found = effects.bring(scene, open_workplace()).dataset()
+    found = effects.examine(scene, open_workplace(), pairs=True).dataset()
     records = []
     for quantity in WATCHED:
         part = found.sel(quantity=quantity)
         record: Record = {"quantity": quantity, "unit": str(part["unit"].values)}
         for name, effect, other in (("rod", ROD, PLAY), ("play", PLAY, ROD)):
-            for kind, second in (("dropped", effect), ("added", effect), ("interaction", other)):
+            for kind, second in (("dropped", {}), ("added", {}), ("interaction", {"other": other})):
                 for part_of in ("", "_uncertainty"):
-                    value = float(part[f"{kind}{part_of}"].sel(effect=effect, other=second))
+                    value = float(part[f"{kind}{part_of}"].sel({"effect": effect, **second}))
                     # infinite where the events differ; JSON has no infinity
                     record[f"{name}_{kind}{part_of}"] = value if np.isfinite(value) else None
         records.append(record)

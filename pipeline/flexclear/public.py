@@ -24,7 +24,6 @@ from flexclear.stages.single_stage import Step, single_stage
 from flexclear.stages.workplace import open_workplace, seconds
 from flexclear.study import answers
 from flexclear.study import compare as comparison
-from flexclear.study import effects as effect_sizes
 from flexclear.study import plan as planning
 from flexclear.study import report as page
 from flexclear.system.errors import FlexclearError as FlexclearError
@@ -323,17 +322,14 @@ def compare(*scenes: AnyScene, ideal: bool | Literal["both", "clearance", "flexi
 def effects(scene: AnyScene, budget: str | float | None = None, *, of: Sequence[str] | str = ()) -> xr.Dataset:
     """Return the size of each effect on each quantity, removed and added, alone and in pairs.
 
-    Variables and meanings: `post.answers.effect_sizes`.  The quantities are those of `[view] watch`, else of
-    `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is removed alone, the most important
-    ones first, with as many members as decide the change (`post.answers.effect_ranking`); a notebook shows the
-    answer first.  of: effects or parts to examine, ``"joint.pin"``, ``"load.spring"``; without it those that plans
-    examine, which leave out bushings (against an ideal joint), springs, forces, gears and balls on planes.  Raises
-    FlexclearError.
+    Variables and meanings: `post.answers.effect_sizes`; a notebook shows the answer first.  The quantities are those of
+    `[view] watch`, else of `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is removed
+    alone, the most important ones first, with as many members as decide the change.  of: effects or parts to examine,
+    ``"joint.pin"``, ``"load.spring"``; without it those that plans examine, which leave out bushings (against an ideal
+    joint), springs, forces, gears and balls on planes.  Raises FlexclearError.
     """
     places = (of,) if isinstance(of, str) else tuple(of)
-    if budget is not None:
-        return answers.dataset("effects", _loaded(scene), budget, of=places)
-    return effect_sizes.bring(_loaded(scene), open_workplace(), of=places).dataset()
+    return answers.dataset("effects", _loaded(scene), budget, of=places)
 
 
 def plan(

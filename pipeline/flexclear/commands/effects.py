@@ -9,7 +9,7 @@ from flexclear.stages.export import as_json
 from flexclear.stages.scenes import graphs, print_files, scene_arguments
 from flexclear.stages.workplace import open_workplace, seconds
 from flexclear.study.answers import answer_of, shown_answer
-from flexclear.study.effects import bring
+from flexclear.study.effects import examine
 from flexclear.study.members import MEMBERS
 from flexclear.system.errors import InputError
 
@@ -42,20 +42,18 @@ def command(options: argparse.Namespace) -> None:
     budget = None if options.budget is None else seconds(options.budget, "--budget")
     if budget is not None and options.members is not None:
         raise InputError("--members", "is chosen by --budget", "leave one of them out")
-    workplace = open_workplace(options)
+    workplace, members = open_workplace(options), options.members or MEMBERS[0]
     datasets: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
         if budget is None:
-            members = options.members or MEMBERS[0]
-            name, made = "effects", bring(graph.scene, workplace, members, options.of)
+            made = examine(graph.scene, workplace, (members,), options.of, pairs=True)
         else:
-            name, made = "effect_ranking", answer_of("effects", graph.scene, workplace, budget, options.of)
+            made = answer_of("effects", graph.scene, workplace, budget, options.of)
         if options.json:
             datasets[graph.scene.name] = made.dataset()
             continue
-        if budget is not None:
-            print(f"{shown_answer('effects', made, graph.scene).text}\n")
-        print(made.text(f"{name}.md"))
-        print_files(made.folder, {f"{name}.nc": "all effect sizes", f"{name}.png": "the chart"})
+        print(f"{shown_answer('effects', made, graph.scene).text}\n")
+        print(made.text("effects.md"))
+        print_files(made.folder, {"effects.nc": "all effect sizes", "effects.png": "the chart"})
     if options.json:
         print(as_json(datasets))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from flexclear.post.plotting.table import Table, files
+from flexclear.post.plotting.table import files
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import Effect, contacts_that_stay
 from flexclear.workflow.task import Task
@@ -35,7 +35,6 @@ class Integrated:
 
 
 def task(
-    stage: str,
     scene: Scene,
     chosen: Sequence[Quantity],
     variants: Mapping[Names, Scene],
@@ -43,10 +42,10 @@ def task(
     integrated: Integrated,
     **params: Any,
 ) -> Task:
-    """Return a task of this module.
+    """Return the task of `run`.
 
-    stage: name of its function, `effects` or `effect_ranking`, and of its files.  variants, watched: scenes and their
-    tasks (`stages.watched_quantities`), by the effects that they lack.  params: those of the function.
+    variants, watched: scenes and their tasks (`stages.watched_quantities`), by the effects that they lack.  params:
+    other ones of `run`.
     """
     gone = frozenset[str]().union(*variants)
     types = {name: joint.type for name, joint in scene.joint.items()}
@@ -62,58 +61,36 @@ def task(
     }
     inputs = {f"variant{k}/{n}": one for k, names in enumerate(variants) for n, one in enumerate(watched[names])}
     return Task(
-        stage=stage,
+        stage="effects",
         scene=scene.name,
-        run=f"flexclear.stages.effect_study:{stage}",
+        run="flexclear.stages.effect_study:run",
         params=shared | params,
         inputs={**inputs, **integrated.runs},
         code=("flexclear.post",),
         folder=f"effects/{scene.name.replace('/', '_')}",
-        names={"nc": f"{stage}.nc"},
+        names={"nc": "effects.nc"},
     )
 
 
-def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``effects.nc``, its table and its chart: each effect alone and in pairs.
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Assemble ``effects.nc``, table and chart.
 
-    params: those of `task`; `effects` (name, kind, within, joint) and the number of `members`. inputs:
-    ``variant<k>/<n>``, as in `watched_quantities`, and those of `Integrated`.
+    params: those of `task`; `removed`, the effects that go with each one; `members`, their number with which each one
+    is compared; `words` of each; those `undone`, in words; `added`, the effects (name, kind, within, joint) that are
+    also added and combined in pairs. inputs: ``variant<k>/<n>``, as in `watched_quantities`, and those of `Integrated`.
     """
-    from flexclear.post.answers import effect_sizes
+    from flexclear.post.answers import effect_answer, effect_sizes
 
     chosen = [Quantity.read(data) for data in params["quantities"]]
-    every = [frozenset(names) for names in params["variants"]]
-    points = {gone: _point(params, inputs, gone, chosen) for gone in every}
     progress(None, "comparing")
-    dataset = effect_sizes.assemble(
-        [Effect(*text) for text in params["effects"]],
-        chosen,
-        points,
-        params["members"],
-        params["units"],
-        _times(params["outputs"], inputs),
-        _error_of(params, inputs),
-    )
-    return _files("effects", dataset, effect_sizes.table, dataset, params)
 
-
-def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Assemble ``effect_ranking.nc``, table and chart: each effect removed alone.
-
-    params: those of `task`; `removed`, the effects that go with each one; `pairs`, the number of members with which
-    each one is compared; `words` of each; those `undone`, in words. inputs: as of `effects`.
-    """
-    from flexclear.post.answers import effect_ranking as ranked
-
-    chosen = [Quantity.read(data) for data in params["quantities"]]
-
-    def pair(name: str, members: int) -> ranked.Pair:
+    def pair(name: str, members: int) -> effect_sizes.Pair:
         gone = frozenset(params["removed"][name])
         full, without = (_point(params, inputs, names, chosen, members) for names in (frozenset[str](), gone))
-        return ranked.Pair(full, without, members)
+        return effect_sizes.Pair(full, without, members)
 
-    results = ranked.assemble(
-        {name: pair(name, members) for name, members in params["pairs"].items()},
+    results = effect_sizes.assemble(
+        {name: pair(name, members) for name, members in params["members"].items()},
         params["words"],
         chosen,
         params["units"],
@@ -121,23 +98,15 @@ def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], 
         _times(params["outputs"], inputs),
         _error_of(params, inputs),
     )
+    if added := [Effect(*text) for text in params["added"]]:
+        every = [frozenset(names) for names in params["variants"]]
+        points = {gone: _point(params, inputs, gone, chosen) for gone in every}
+        results = effect_sizes.with_pairs(results, added, chosen, points, max(params["members"].values()))
+    results.attrs["staying"] = effect_sizes.staying_contacts_sentence(params["staying"])
     listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
     shown = listed.assign_coords(effect=listed["words"].values)
-    return _files("effect_ranking", results, ranked.table, shown, params)
-
-
-def _files(
-    name: str,
-    dataset: xr.Dataset,
-    table: Callable[[xr.Dataset], Table],
-    shown: xr.Dataset,
-    params: Mapping[str, Any],
-) -> dict[str, Any]:
-    """Return the files of a result. shown: the dataset of the chart."""
-    from flexclear.post.answers.effect_sizes import chart, staying_contacts_sentence
-
-    dataset.attrs["staying"] = staying_contacts_sentence(params["staying"])
-    return {"nc": dataset} | files(name, table(dataset)) | chart(name, shown, f"Effect sizes: {params['title']}")
+    drawn = effect_sizes.chart("effects", shown, f"Effect sizes: {params['title']}")
+    return {"nc": results} | files("effects", effect_answer.table(results)) | drawn
 
 
 def _point(

@@ -46,7 +46,7 @@ class ShownAnswer:
 
 def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     """Return heading, text, picture and table of the answer called accuracy, stability or effects."""
-    from flexclear.post.answers import effect_ranking
+    from flexclear.post.answers import effect_answer
     from flexclear.post.cost.study import sentences
 
     data = answer.dataset()
@@ -62,20 +62,23 @@ def shown_answer(name: str, answer: Made, scene: Scene) -> ShownAnswer:
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
     caption = "Change of each quantity without the effect; thin lines: part that may be due to chance"
-    text, table = effect_ranking.sentence(data, requested), scenes.tables(answer, "effect_ranking.md")
-    return ShownAnswer("Which effects matter", text, "effect_ranking.png", caption, table)
+    text, table = effect_answer.sentence(data, requested), scenes.tables(answer, "effects.md")
+    return ShownAnswer("Which effects matter", text, "effects.png", caption, table)
 
 
 def dataset(name: str, scene: Scene, budget: str | float | None, *, of: Sequence[str] = ()) -> xr.Dataset:
     """Return one of the three answers, or the whole study "cost", as a dataset that shows the answer in a notebook.
 
-    budget: processor time [s], or text such as "2min".  of: as of `Answers`. Raises as `answer_of`.
+    budget: processor time [s], or text such as "2min"; without it effects are also added, and combined in pairs.  of:
+    as of `Answers`. Raises as `answer_of`.
     """
     from flexclear.post.answers.answered import with_answer
 
-    # in this process: a worker would run a caller's script again from its top
-    workplace, given = replace(open_workplace(), jobs=1), None if budget is None else seconds(budget, "budget")
-    if name == "cost":
+    place, given = open_workplace(), None if budget is None else seconds(budget, "budget")
+    workplace = replace(place, jobs=1)  # in this process: a worker would run a caller's script again from its top
+    if name == "effects" and given is None:
+        answer = effects.examine(scene, place, of=of, pairs=True)
+    elif name == "cost":
         name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET)
     else:
         answer = answer_of(name, scene, workplace, given, of)
@@ -153,7 +156,7 @@ class Answers:
 
     @cached_property
     def effects(self) -> Made:
-        """Return which effects matter (`effects.rank`); raise InputError for a scene without effects or watches."""
+        """Return which effects matter (`effects.examine`); raise InputError for a scene without effects or watches."""
         study, levels = self._started, MEMBERS[:1] if self.seconds is None else MEMBERS
         own = study.setting, study.own * study.seconds_each
-        return effects.rank(self.scene, self.workplace, own, study.budget, levels, self.of)
+        return effects.examine(self.scene, self.workplace, levels, self.of, own=own, budget=study.budget)

@@ -1,7 +1,7 @@
 """``flexclear effects`` and the answer on effects: effect size of each part of a scene on each quantity, by removal.
 
-Either all effects are removed and added, alone and in pairs, with one number of members; or each is removed alone, with
-more members until its change is decided, within a budget.
+Each effect is removed, with more members until its change is decided, within a budget. On request each is added, too,
+and pairs are removed and added.
 """
 
 from __future__ import annotations
@@ -25,66 +25,65 @@ if TYPE_CHECKING:
 Names = effect_study.Names
 
 
-def bring(scene: Scene, workplace: Workplace, members: int = MEMBERS[0], of: Sequence[str] = ()) -> Made:
-    """Run all variants; return effect sizes over (effect, other, quantity).
-
-    of: names of effects or parts, as of `variants.effects_of`.  Raises InputError for a scene without effects or
-    watched quantities.
-    """
-    from flexclear.post.answers.effect_sizes import variants as requested
-
-    if members < 2:
-        raise InputError(
-            "--members", f"must be at least 2 (got {members})", "the scatter cannot be estimated from one start"
-        )
-    effects, chosen = _examined(scene, of)
-    setting, runs = setting_of(scene, workplace), Members(workplace, chosen)
-    made = {gone: _without(scene, effects, gone, setting) for gone in requested(effects)}
-    runs.points(made, members)
-    params = {"effects": [[e.name, e.kind, e.within, e.joint] for e in effects], "members": members}
-    errors = integrated(scene, setting)
-    return workplace.made(effect_study.task("effects", scene, chosen, made, runs.tasks, errors, **params))[0]
-
-
-def rank(
+def examine(
     scene: Scene,
     workplace: Workplace,
-    own: tuple[Setting, float],
-    budget: Budget,
-    levels: Sequence[int] = MEMBERS,
+    levels: Sequence[int] = MEMBERS[:1],
     of: Sequence[str] = (),
+    *,
+    pairs: bool = False,
+    own: tuple[Setting, float] | None = None,
+    budget: Budget | None = None,
 ) -> Made:
-    """Run the scene without each effect; return which effects matter (`stages.effect_study`).
+    """Run the scene without each effect; return effect sizes and which effects matter (`stages.effect_study`).
 
-    own: setting and processor time [s] of the scene's own run.  levels: numbers of members that are tried until a
-    change beyond the horizon is decided.  of: as of `bring`, with the same errors.
+    levels: numbers of members that are tried until a change beyond the horizon is decided.  of: names of effects or
+    parts, as of `variants.effects_of`.  pairs: also add each effect to the bare scene, and remove and add pairs. own:
+    setting and processor time [s] of the scene's own run, where known.  Raises InputError for a scene without effects
+    or watched quantities.
     """
-    from flexclear.post.answers.effect_ranking import IDEAL, Pair, undecided_quantities
+    from flexclear.post.answers.effect_sizes import IDEAL, Pair, undecided_quantities
+    from flexclear.post.answers.effect_sizes import variants as combined
 
+    if min(levels) < 2:
+        text = f"must be at least 2 (got {min(levels)})"
+        raise InputError("--members", text, "the scatter cannot be estimated from one start")
     effects, chosen = _examined(scene, of)
-    removed, (setting, seconds) = _removed(scene, effects, IDEAL), own
+    removed, (setting, seconds) = _removed(scene, effects, IDEAL), own or (setting_of(scene, workplace), 0.0)
     levels = levels if scene.contacts() or scene.stops() else (0,)
     full, tight = frozenset[str](), False
     while True:
-        runs, sets = Members(workplace, chosen, budget, seconds), (full, *removed.values())
+        runs, sets = Members(workplace, chosen, budget or Budget(), seconds), (full, *removed.values())
         made = {gone: _without(scene, effects, gone, setting, tight=tight) for gone in sets}
 
         def more(members: int, points: Mapping[Names, Point]) -> Collection[Names]:
-            pairs = {gone: Pair(points[full], point, members) for gone, point in points.items() if gone}
-            return [gone for gone, pair in pairs.items() if undecided_quantities(pair, chosen)]
+            compared = {gone: Pair(points[full], point, members) for gone, point in points.items() if gone}
+            return [gone for gone, pair in compared.items() if undecided_quantities(pair, chosen)]
 
         reached = runs.until_decided(made, levels, more)
+        ran = {gone: made[gone] for gone in (full, *reached)}
+        if pairs:
+            ran |= {gone: _without(scene, effects, gone, setting, tight=tight) for gone in combined(effects)}
+            runs.points(ran, levels[-1])
         if tight or not runs.refused:
             break
         tight = True  # members run at the scene's own tolerance, since the looser one for means was refused
-    pairs = {name: reached[gone] for name, gone in removed.items() if gone in reached}
+    members = {name: reached[gone] for name, gone in removed.items() if gone in reached}
     words = {effect.name: effect.words for effect in effects} | {IDEAL: IDEAL}
     if removed.get(IDEAL) in [gone for name, gone in removed.items() if name != IDEAL]:
         words[IDEAL] = ""  # is listed as that effect
-    left = ", ".join(words[name] for name in removed if name not in pairs and words[name])
-    ran, errors = {gone: made[gone] for gone in (full, *reached)}, integrated(scene, setting, tight=tight)
-    params = {"removed": {name: sorted(removed[name]) for name in pairs}, "pairs": pairs, "words": words}
-    task = effect_study.task("effect_ranking", scene, chosen, ran, runs.tasks, errors, undone=left, **params)
+    task = effect_study.task(
+        scene,
+        chosen,
+        ran,
+        runs.tasks,
+        integrated(scene, setting, tight=tight),
+        removed={name: sorted(removed[name]) for name in members},
+        members=members,
+        words=words,
+        undone=", ".join(words[name] for name in removed if name not in members and words[name]),
+        added=[[e.name, e.kind, e.within, e.joint] for e in effects] if pairs else [],
+    )
     return workplace.made(task)[0]
 
 

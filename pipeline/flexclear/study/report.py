@@ -132,7 +132,7 @@ def _page(
     run: xr.Dataset | None,
     answers: Mapping[str, Made],
 ) -> bytes:
-    from flexclear.post.answers.effect_ranking import ideal_sentences
+    from flexclear.post.answers.effect_answer import ideal_sentences
     from flexclear.post.answers.summary import answer, effects
     from flexclear.post.single_run.series import parameters
 

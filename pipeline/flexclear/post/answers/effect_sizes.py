@@ -1,26 +1,36 @@
-"""Effect sizes of each effect on each quantity, by removal and addition, alone and in pairs: dataset, table, chart.
+"""Effect sizes of each effect on each quantity, by removal, on request added and in pairs as well: dataset, chart.
 
 Variants are named by the effects that they lack. The full scene lacks none, the bare one lacks all.
+
+Scenes with contacts are compared by the means of members with slightly different starts, the same in each variant. A
+change is decided where it is twice its uncertainty by chance, or where both together are below a hundredth of the
+quantity's size (`artifacts.effect_size`). Up to the horizon the members are one motion, and a change is uncertain by
+the error of the time integration only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import combinations
+from dataclasses import dataclass
+from itertools import combinations, product
 
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.effect_size import Influence, change, early_changes, influence, over_run
+from flexclear.artifacts.effect_size import Influence, change, early_changes, influence, over_run, size
 from flexclear.artifacts.points import Point
 from flexclear.post.overview.curves import format_with_error, in_unit
-from flexclear.post.plotting.table import Table
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.variants import Effect
 
 Names = frozenset[str]
 #: substitute for a variant that did not run
 UNKNOWN = Point({}, {}, {}, 0, "not run")
+#: effect of clearance and flexibility together: the scene against the ideal mechanism
+IDEAL = "clearance and flexibility"
+#: fraction of a quantity's size below which a change need not be resolved; the answer names effects above it where the
+#: scene requests no accuracy
+SLIGHT = 0.01
 #: ratio of an axis's limits below which it has ticks between the powers of ten
 FEW = 30.0
 #: labels of the chart's bars
@@ -29,15 +39,43 @@ LEGEND = {"dropped": "removed", "added": "added alone", "early": "removed, up to
 WHISKER = 0.9
 #: words for an infinite effect size, and their meaning
 NOT_COMPARABLE = "not comparable"
-MEANING_NOT_COMPARABLE = (
-    "Not comparable: the quantity exists only with the effect, or the runs differ in their number of impacts."
-)
 #: variables of the dataset, and their meaning
 MEANINGS = {
-    "dropped": "change of the quantity when the effect, or both effects, are removed from the full scene",
-    "added": "change when the effect, or both, are added to the bare scene (friction: with its clearance)",
+    "dropped": "change of the quantity when the effect is removed from the full scene",
+    "early": "that change up to the horizon",
+    "added": "change when the effect is added to the bare scene (friction: with its clearance)",
+    "dropped_pair": "change when both effects are removed from the full scene",
+    "added_pair": "change when both effects are added to the bare scene",
     "interaction": "change by both effects together in the bare scene minus the sum of their single changes",
 }
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The scene and the scene without an effect, each over so many members (0: one run, without contacts)."""
+
+    full: Point
+    without: Point
+    members: int
+
+
+def influence_of(pair: Pair, quantity: Quantity) -> Influence:
+    """Return the change by the effect; nan where a run was refused."""
+    return change(pair.without, pair.full, quantity, pair.members)
+
+
+def is_decided(change: Influence, scale: float) -> bool:
+    """Return True when further ensemble members cannot change the verdict on a change."""
+    if not np.isfinite(change.difference) or change.uncertainty == 0.0:
+        return True
+    return change.real or change.most <= SLIGHT * scale
+
+
+def undecided_quantities(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
+    """Return the quantities whose verdict beyond the horizon further members may change."""
+    if pair.full.refused or pair.without.refused:
+        return []
+    return [q for q in chosen if not is_decided(influence_of(pair, q), size(pair.full, q))]
 
 
 def variants(effects: Sequence[Effect]) -> list[Names]:
@@ -59,80 +97,98 @@ def closed_up(effects: Sequence[Effect], present: Names) -> Names:
 
 
 def assemble(
+    pairs: Mapping[str, Pair],
+    words: Mapping[str, str],
+    chosen: Sequence[Quantity],
+    units: Sequence[str],
+    undone: str,
+    times: Sequence[float] = (),
+    error: Callable[[Quantity, float], float] = lambda quantity, until: 0.0,
+) -> xr.Dataset:
+    """Return changes over (effect, quantity) in the quantities' SI units, each with an `_uncertainty`.
+
+    pairs: by effect, with `IDEAL` where the scene has an ideal counterpart.  words: of the effects; empty for one that
+    is not listed.  undone: effects that the budget did not reach, in words.  times: of the outputs [s].  error: of the
+    time integration of a run in a quantity up to a time [s].  nan where a variant was refused; infinite where the
+    quantity goes with the effect.
+    """
+    dims = ("effect", "quantity")
+    begun = [early_changes(p.without, p.full, chosen, p.members, times, error) for p in pairs.values()]
+    early = [row for _, row in begun]
+    changes = [
+        [over_run(influence_of(pair, q), one, q) for q, one in zip(chosen, row, strict=True)]
+        for pair, row in zip(pairs.values(), early, strict=True)
+    ]
+    full = next(iter(pairs.values())).full
+    scales = [size(full, q) if not full.refused else np.nan for q in chosen]
+    horizon = "time up to which the members of both variants are one motion each; nan: they always are"
+    data = {
+        "decided": (dims, np.array([[is_decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
+        "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
+        "members": (("effect",), np.array([pair.members for pair in pairs.values()])),
+        "horizon": (("effect",), [until for until, _ in begun], {"units": "s", "long_name": horizon}),
+    }
+    for kind, rows in (("dropped", changes), ("early", early)):
+        sizes = [[(c.difference, c.uncertainty) for c in row] for row in rows]
+        data |= _variables(kind, dims, np.reshape(sizes, (len(pairs), len(chosen), 2)))
+    coordinates = {
+        "effect": list(pairs),
+        "words": ("effect", [words[name] for name in pairs]),
+        "quantity": [q.name for q in chosen],
+        "unit": ("quantity", list(units)),
+    }
+    refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
+    text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why and words[name])
+    return xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
+
+
+def _variables(kind: str, dims: Sequence[str], sizes: np.ndarray) -> dict[str, tuple]:
+    """Return the variable of a kind of effect size, and that of its uncertainty. sizes: both, in the last dimension."""
+    chance = {"long_name": f"{MEANINGS[kind]}: part that may be due to chance or to errors of the time integration"}
+    return {
+        kind: (dims, sizes[..., 0], {"long_name": MEANINGS[kind]}),
+        f"{kind}_uncertainty": (dims, sizes[..., 1], chance),
+    }
+
+
+def with_pairs(
+    result: xr.Dataset,
     effects: Sequence[Effect],
     chosen: Sequence[Quantity],
     points: Mapping[Names, Point],
     members: int,
-    units: Sequence[str],
-    times: Sequence[float] = (),
-    error: Callable[[Quantity, float], float] = lambda quantity, until: 0.0,
 ) -> xr.Dataset:
-    """Return effect sizes over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
+    """Return the effect sizes with those of effects that are added, over (effect, quantity), and of pairs over
+    (effect, other, quantity).
 
-    The diagonal of (effect, other) holds single effects.  points: by the effects that a variant lacks. units: of the
-    chosen quantities.  times, error: of `effect_size.early_changes`.  nan where a variant was refused; infinite where
-    the quantity goes with the effect.
+    points: by the effects that a variant lacks.
     """
-    every, n = frozenset(effect.name for effect in effects), len(effects)
-    shape = (n, n, len(chosen))
-    begun = list[tuple[float, list[Influence]]]()
-    data = {f"{name}{part}": np.full(shape, np.nan) for name in MEANINGS for part in ("", "_uncertainty")}
-    full = points[frozenset()]
-    for i, one in enumerate(effects):
-        for j, other in enumerate(effects):
-            pair = frozenset({one.name, other.name})
-            # an effect within another one is added on top of that one
-            ground = every - (closed_up(effects, pair) - pair)
-            bare, lost = points.get(ground, UNKNOWN), points[with_dependents(effects, pair)]
-            gained = points[every - closed_up(effects, pair)]
-            single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
-            independent = i != j and one.within != other.name and other.within != one.name
+    every, names = frozenset(effect.name for effect in effects), result["effect"].values.tolist()
+    shape = (len(names), len(names), len(chosen), 2)
+    added, data = np.full((len(names), *shape[2:]), np.nan), dict[str, np.ndarray]()
+    for one, other in product(effects, repeat=2):
+        pair = frozenset({one.name, other.name})
+        # an effect within another one is added on top of that one
+        ground = every - (closed_up(effects, pair) - pair)
+        bare, gained = points.get(ground, UNKNOWN), points[every - closed_up(effects, pair)]
+        lost = points[with_dependents(effects, pair)]
+        single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
+        i, j = names.index(one.name), names.index(other.name)
+        for k, quantity in enumerate(chosen):
+            found = {"added_pair": change(gained, bare, quantity, members)}
             if i == j:
-                begun.append(early_changes(lost, full, chosen, members, times, error))
-            for k, quantity in enumerate(chosen):
-                variables = {"dropped": change(lost, full, quantity, members)}
-                if i == j:
-                    variables["dropped"] = over_run(variables["dropped"], begun[i][1][k], quantity)
-                variables["added"] = change(gained, bare, quantity, members)
-                if independent:
-                    variables["interaction"] = _interaction(gained, single, bare, quantity, members)
-                for name, value in variables.items():
-                    data[name][i, j, k], data[f"{name}_uncertainty"][i, j, k] = value.difference, value.uncertainty
-    dims = ("effect", "other", "quantity")
-    result = xr.Dataset(
-        {name: (dims, values) for name, values in data.items()},
-        coords={
-            "effect": [effect.name for effect in effects],
-            "other": [effect.name for effect in effects],
-            "words": ("effect", [effect.words for effect in effects]),
-            "quantity": [quantity.name for quantity in chosen],
-            "unit": ("quantity", list(units)),
-        },
-        attrs={"Conventions": "CF-1.11", "members": members},
-    )
-    for name, text in MEANINGS.items():
-        result[name].attrs = {"long_name": text}
-        result[f"{name}_uncertainty"].attrs = {"long_name": f"{text}: part that may be due to chance"}
-    refused = {"+".join(sorted(gone)) or "full": p.refused for gone, p in points.items() if p.refused}
-    why = "\n".join(f"without {gone}: {why}" for gone, why in refused.items())
-    return with_early_changes(result, begun).assign_attrs(refused=why)
-
-
-def with_early_changes(result: xr.Dataset, begun: Sequence[tuple[float, Sequence[Influence]]]) -> xr.Dataset:
-    """Return the dataset of effects with their horizons [s] and their changes of each quantity up to these.
-
-    begun: results of `effect_size.early_changes`, by effect.
-    """
-    rows = [[(c.difference, c.uncertainty) for c in changes] for _, changes in begun]
-    early = np.array(rows).reshape(len(begun), result.sizes["quantity"], 2)
-    dims, change = ("effect", "quantity"), f"{MEANINGS['dropped']}, up to the horizon"
-    doubt = "part of that change that may be due to errors of the time integration"
-    words = "time up to which the members of both variants are one motion each; nan: they always are"
-    return result.assign(
-        early=(dims, early[:, :, 0], {"long_name": change}),
-        early_uncertainty=(dims, early[:, :, 1], {"long_name": doubt}),
-        horizon=(("effect",), [horizon for horizon, _ in begun], {"units": "s", "long_name": words}),
-    )
+                added[i, k] = found["added_pair"].difference, found["added_pair"].uncertainty
+                continue
+            found["dropped_pair"] = change(lost, points[frozenset()], quantity, members)
+            if one.within != other.name and other.within != one.name:
+                found["interaction"] = _interaction(gained, single, bare, quantity, members)
+            for kind, value in found.items():
+                sizes = data.setdefault(kind, np.full(shape, np.nan))
+                sizes[i, j, k] = value.difference, value.uncertainty
+    variables = _variables("added", ("effect", "quantity"), added)
+    for kind, sizes in data.items():
+        variables |= _variables(kind, ("effect", "other", "quantity"), sizes)
+    return result.assign(variables).assign_coords(other=names)
 
 
 def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:
@@ -156,49 +212,10 @@ def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Qu
     return influence(Point(values, {}, deviation, 0), nothing, quantity, members)
 
 
-def table(dataset: xr.Dataset) -> Table:
-    """Tabulate the change of each quantity by removal and addition of each effect; and the strongest interactions."""
-    rows, horizon = [], dataset["horizon"].values
-    until = ["dropped, up to the horizon"] if np.isfinite(horizon).any() else []
-    for k, quantity in enumerate(dataset["quantity"].values):
-        unit = str(dataset["unit"].values[k])
-        for i, effect in enumerate(dataset["effect"].values):
-            reached = f" to {in_unit(horizon[i], 's')}" if np.isfinite(horizon[i]) else ""
-            finite = np.isfinite(dataset["early"].values[i, k])
-            cells = [f"{cell(dataset, 'early', (i, k), unit)}{reached if finite else ''}" for _ in until]
-            cells += [cell(dataset, name, (i, i, k), unit) for name in ("dropped", "added")]
-            rows.append((str(quantity), str(effect), *cells, *_partner(dataset, i, k, unit)))
-    notes = [
-        "Dropped: largest change of the quantity over the run when the effect is removed from the full scene. Added: "
-        "when it is added to the bare scene (friction: to the one with its clearance). Interaction: change by both "
-        "effects together minus the sum of their single changes.",
-        "For runs with contacts, the number after ± may be due to chance (Student's t of the members' means).",
-    ]
-    notes += [f"Refused: {line}" for line in filter(None, dataset.attrs["refused"].split("\n"))]
-    notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
-    notes += filter(None, [dataset.attrs.get("staying")])
-    notes += ["Up to the horizon all runs of a variant are one motion."] if until else []
-    columns = ("quantity", "effect", *until, "dropped", "added", "interaction", "with")
-    return Table("Effect sizes", columns, tuple(rows), tuple(notes))
-
-
-def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
-    """Return the strongest interaction of an effect, and the name of its partner."""
-    sizes = dataset["interaction"].values[i, :, k]
-    finite = np.where(np.isfinite(sizes), sizes, -1.0)
-    if not len(finite) or finite.max() < 0.0:
-        return "–", "–"
-    j = int(np.argmax(finite))
-    return cell(dataset, "interaction", (i, j, k), unit), str(dataset["effect"].values[j])
-
-
-def cell(dataset: xr.Dataset, name: str, at: tuple[int, ...], unit: str) -> str:
-    """Format an effect size of a dataset with its uncertainty."""
+def cell(dataset: xr.Dataset, name: str, at: tuple[int, ...]) -> str:
+    """Format an effect size of a dataset, of the quantity of the last index, with its uncertainty."""
     value, uncertainty = (float(dataset[part].values[at]) for part in (name, f"{name}_uncertainty"))
-    return _cell(value, uncertainty, unit)
-
-
-def _cell(value: float, uncertainty: float, unit: str) -> str:
+    unit = str(dataset["unit"].values[at[-1]])
     return "none" if value == uncertainty == 0.0 else format_difference(value, uncertainty, unit)
 
 
@@ -233,15 +250,12 @@ def staying_contacts_sentence(names: Sequence[str]) -> str:
 def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
     """Draw bars of the sizes of single effects, a panel for each quantity; a line where an accuracy is requested.
 
-    Uses `dropped` and, where they exist, `added` or `early`, of single effects.
+    Uses `dropped` and, where they exist, `added` or `early`.
     """
     from matplotlib.ticker import NullFormatter
 
     from flexclear.post.plotting import style
 
-    if "other" in dataset.dims:
-        diagonal = xr.DataArray(np.arange(dataset.sizes["effect"]), dims="effect")
-        dataset = dataset.isel(effect=diagonal, other=diagonal)
     names = [str(effect) for effect in dataset["effect"].values]
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
     early = "added" not in dataset and "early" in dataset and bool(np.isfinite(dataset["horizon"].values).any())
@@ -250,7 +264,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         figure, axes = style.panels(len(chosen), min(2, len(chosen)), 10.0, 1.1, 0.9 + 0.3 * len(names), sharey=True)
         for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):
-                values, unit = dataset[kind].values[:, k], str(dataset["unit"].values[k])
+                values = dataset[kind].values[:, k]
                 by_chance = np.nan_to_num(dataset.get(f"{kind}_uncertainty", 0.0 * dataset[kind]).values[:, k])
                 rows = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
@@ -260,8 +274,8 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 panel.errorbar(
                     shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
                 )
-                for y, value, chance in zip(rows, values, by_chance, strict=True):
-                    text = "not examined" if np.isnan(value) else _cell(value, chance, unit)
+                for row, (y, value) in enumerate(zip(rows, values, strict=True)):
+                    text = "not examined" if np.isnan(value) else cell(dataset, kind, (row, k))
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")

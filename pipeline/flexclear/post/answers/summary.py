@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.artifacts import quantities
 from flexclear.artifacts.effect_size import Influence
-from flexclear.post.answers.effect_ranking import in_words
+from flexclear.post.answers.effect_answer import in_words
 from flexclear.post.answers.effect_sizes import staying_contacts_sentence
 from flexclear.post.overview.curves import impacts, in_unit
 from flexclear.post.single_run.series import parameters
@@ -31,7 +31,7 @@ def answer(
     """Return a list of sentences, as HTML.
 
     compared: of `overview.comparison`, the ideal counterpart first and the scene last; or None. run: schema RUN of the
-    scene.  warnings: of the run.  changes: sentences of `post.answers.effect_ranking` on the differences from the ideal
+    scene.  warnings: of the run.  changes: sentences of `post.answers.effect_answer` on the differences from the ideal
     mechanism; they replace those from two runs alone.
     """
     sentences = [] if compared is None else [*changes] or _effects(compared)

@@ -1,47 +1,33 @@
-"""Effects of a scene that matter: the change of each quantity without the effect, and its uncertainty.
-
-Scenes with contacts are compared by the means of members with slightly different starts, the same in each variant. A
-change is decided where it is twice its uncertainty by chance, or where both together are below a hundredth of the
-quantity's size (`artifacts.effect_size`). Up to the horizon the members are one motion, and a change is uncertain by
-the error of the time integration only.
-"""
+"""Effects of a scene that matter, in words and as a table."""
 
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.effect_size import (
-    REAL,
-    Influence,
-    chance,
-    change,
-    early_changes,
-    over_run,
-    size,
-)
-from flexclear.artifacts.points import Point
+from flexclear.artifacts.effect_size import REAL, Influence, chance
 from flexclear.post.answers.effect_sizes import (
-    MEANING_NOT_COMPARABLE,
+    IDEAL,
     NOT_COMPARABLE,
+    SLIGHT,
     cell,
     format_difference,
+    is_decided,
     join_names,
-    with_early_changes,
 )
 from flexclear.post.overview.curves import format_to_digits, in_unit, size_of
 from flexclear.post.plotting.table import Table
-from flexclear.scene.quantity import Quantity
 
-#: effect of clearance and flexibility together: the scene against the ideal mechanism
-IDEAL = "clearance and flexibility"
-#: fraction of a quantity's size below which a change need not be resolved; the answer names effects above it where the
-#: scene requests no accuracy
-SLIGHT = 0.01
+MEANING_NOT_COMPARABLE = (
+    "Not comparable: the quantity exists only with the effect, or the runs differ in their number of impacts."
+)
+MEANING_OF_PAIRS = (
+    "Added alone: change when the effect is added to the bare scene (friction: to the one with its clearance). "
+    "Interaction: strongest change by the effect and another one together minus the sum of their single changes."
+)
 PERCENTAGES = "Percentages are of each quantity's largest value; of positions and angles, of the largest change."
 #: number of members from which on Student's t does not change
 MANY = 1000
@@ -49,79 +35,6 @@ MANY = 1000
 LARGE = 100.0
 #: change that rounding of both runs could cause, as a fraction of the quantity's size
 NOTHING = 1e-6
-
-
-@dataclass(frozen=True)
-class Pair:
-    """The scene and the scene without an effect, each over so many members (0: one run, without contacts)."""
-
-    full: Point
-    without: Point
-    members: int
-
-
-def influence_of(pair: Pair, quantity: Quantity) -> Influence:
-    """Return the change by the effect; nan where a run was refused."""
-    return change(pair.without, pair.full, quantity, pair.members)
-
-
-def is_decided(change: Influence, scale: float) -> bool:
-    """Return True when further ensemble members cannot change the verdict on a change."""
-    if not np.isfinite(change.difference) or change.uncertainty == 0.0:
-        return True
-    return change.real or change.most <= SLIGHT * scale
-
-
-def undecided_quantities(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
-    """Return the quantities whose verdict beyond the horizon further members may change."""
-    if pair.full.refused or pair.without.refused:
-        return []
-    return [q for q in chosen if not is_decided(influence_of(pair, q), size(pair.full, q))]
-
-
-def assemble(
-    pairs: Mapping[str, Pair],
-    words: Mapping[str, str],
-    chosen: Sequence[Quantity],
-    units: Sequence[str],
-    undone: str,
-    times: Sequence[float] = (),
-    error: Callable[[Quantity, float], float] = lambda quantity, until: 0.0,
-) -> xr.Dataset:
-    """Return changes over (effect, quantity) in the quantities' SI units.
-
-    pairs: by effect, with `IDEAL` where the scene has an ideal counterpart.  words: of the effects; empty for one that
-    is not listed.  undone: effects that the budget did not reach, in words.  times: of the outputs [s].  error: of the
-    time integration of a run in a quantity up to a time [s].
-    """
-    names = list(pairs)
-    begun = [early_changes(p.without, p.full, chosen, p.members, times, error) for p in pairs.values()]
-    changes = [
-        [over_run(influence_of(pair, q), early, q) for q, early in zip(chosen, row, strict=True)]
-        for pair, (_, row) in zip(pairs.values(), begun, strict=True)
-    ]
-    full = next(iter(pairs.values())).full
-    scales = [size(full, q) if not full.refused else np.nan for q in chosen]
-    differences = np.array([[c.difference for c in row] for row in changes])
-    uncertainties = np.array([[c.uncertainty for c in row] for row in changes])
-    dims = ("effect", "quantity")
-    data = {
-        "dropped": (dims, differences, {"long_name": "change without the effect"}),
-        "dropped_uncertainty": (dims, uncertainties, {"long_name": "part of the change that may be due to chance"}),
-        "decided": (dims, np.array([[is_decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
-        "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
-        "members": (("effect",), np.array([pairs[name].members for name in names])),
-    }
-    coordinates = {
-        "effect": names,
-        "words": ("effect", [words[name] for name in names]),
-        "quantity": [q.name for q in chosen],
-        "unit": ("quantity", list(units)),
-    }
-    refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
-    text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why and words[name])
-    result = xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
-    return with_early_changes(result, begun)
 
 
 def ideal_sentences(result: xr.Dataset) -> list[str]:
@@ -245,28 +158,45 @@ def round_up(runs: int) -> int:
 
 
 def table(result: xr.Dataset) -> Table:
-    """Tabulate the changes without each effect: effects as rows, quantities as columns."""
-    rows = []
+    """Tabulate the changes by each effect: effects as rows, quantities as columns."""
+    rows, quantities, pairs = list[tuple[str, ...]](), range(result.sizes["quantity"]), "interaction" in result
     for i, words in enumerate(str(w) for w in result["words"].values):
         if not words:
             continue
-        units = [str(unit) for unit in result["unit"].values]
-        cells = [cell(result, "dropped", (i, k), unit) for k, unit in enumerate(units)]
+        cells = {
+            kind: [cell(result, kind, (i, k)) for k in quantities]
+            for kind in ("dropped", "early", "added")
+            if kind in result
+        }
         members, until = int(result["members"][i]), float(result["horizon"][i])
         if np.isfinite(until):
-            early = [cell(result, "early", (i, k), unit) for k, unit in enumerate(units)]
-            rows.append((f"{words}, up to {in_unit(until, 's')}", *early, "one motion"))
-            rows.append((f"{words}, whole run", *cells, _deciding(result, i)[1]))
+            rows.append((f"{words}, up to {in_unit(until, 's')}", *cells["early"], "one motion"))
+            rows.append((f"{words}, whole run", *cells["dropped"], _deciding(result, i)[1]))
         else:
-            rows.append((words, *cells, str(members) if members else "one run"))
+            rows.append((words, *cells["dropped"], str(members) if members else "one run"))
+        if "added" in cells and result["effect"][i] != IDEAL:
+            rows.append((f"{words}, added alone", *cells["added"], ""))
+        if pairs and result["effect"][i] != IDEAL:
+            rows.append((f"{words}, interaction", *(_strongest(result, i, k) for k in quantities), ""))
     notes = ["Largest change of each quantity without the effect. The number after ± or < may be due to chance."]
     if np.isfinite(result["horizon"].values).any():
         notes.append("Up to the horizon, all runs of a variant are one motion: ± or < is due to starts and time steps.")
+    notes += [MEANING_OF_PAIRS] if "added" in result else []
     notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
+    notes += filter(None, [result.attrs.get("staying")])
     return Table(
         "Effect sizes",
         ("without", *(str(q) for q in result["quantity"].values), "members"),
         tuple(rows),
         tuple(notes),
     )
+
+
+def _strongest(result: xr.Dataset, i: int, k: int) -> str:
+    """Return a cell with the strongest interaction of an effect in a quantity, and the other effect's name."""
+    sizes = result["interaction"].values[i, :, k]
+    if not np.isfinite(sizes).any():
+        return "–"
+    j = int(np.nanargmax(np.where(np.isfinite(sizes), sizes, np.nan)))
+    return f"{cell(result, 'interaction', (i, j, k))}, with {result['words'].values[j]}"

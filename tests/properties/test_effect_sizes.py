@@ -4,20 +4,21 @@ import numpy as np
 import pytest
 
 from flexclear.artifacts.points import Point
-from flexclear.post.answers.effect_ranking import (
+from flexclear.post.answers.effect_answer import ideal_sentences, members_to_decide, sentence, table
+from flexclear.post.answers.effect_sizes import (
     IDEAL,
     Pair,
     assemble,
-    ideal_sentences,
+    chart,
     influence_of,
     is_decided,
-    members_to_decide,
-    sentence,
-    table,
+    staying_contacts_sentence,
     undecided_quantities,
+    variants,
+    with_pairs,
 )
-from flexclear.post.answers.effect_sizes import chart, staying_contacts_sentence
 from flexclear.scene.quantity import Quantity
+from flexclear.scene.variants import Effect
 
 VELOCITY = Quantity("slider", "velocity")
 TIME = np.linspace(0.0, 1.0, 201)
@@ -199,3 +200,24 @@ def test_the_error_of_the_integration_bounds_what_is_decided_up_to_the_horizon()
     found = assemble({"weak": pair}, {"weak": "weak"}, [VELOCITY], ["m/s"], "", TIME, lambda quantity, until: 2e-3)
     assert float(found["early"][0, 0]) == 0.0
     assert float(found["early_uncertainty"][0, 0]) == pytest.approx(9e-3, rel=1e-2)  # 5 mm/s and 2 mm/s of each run
+
+
+def test_effects_that_are_added_and_combined_are_rows_of_the_same_table():
+    """Two effects of 0.2 and 0.1 m/s that together change the velocity by 0.35 m/s: 0.05 beyond their sum."""
+    one, two = Effect("one", "gravity"), Effect("two", "friction")
+    speeds = {("one", "two"): 0.0, ("two",): 0.2, ("one",): 0.1, (): 0.35}
+    points = {frozenset(gone): point(speed) for gone, speed in speeds.items()}
+    assert set(variants([one, two])) == set(points)
+    full = points[frozenset()]
+    pairs = {name: Pair(full, points[frozenset({name})], 0) for name in ("one", "two")}
+    made = assemble(pairs, {"one": "gravity", "two": "friction"}, [VELOCITY], ["m/s"], "", TIME)
+    found = with_pairs(made, [one, two], [VELOCITY], points, 0)
+    assert found["dropped"].values[:, 0] == pytest.approx([0.25, 0.15])
+    assert found["added"].values[:, 0] == pytest.approx([0.2, 0.1])
+    assert float(found["interaction"].sel(effect="one", other="two")[0]) == pytest.approx(0.05)
+    assert float(found["dropped_pair"].sel(effect="one", other="two")[0]) == pytest.approx(0.35)
+    rows = {row[0]: row[1:] for row in table(found).rows}
+    assert rows["gravity"] == ("250 mm/s", "one run")
+    assert rows["friction, added alone"] == ("100 mm/s", "")
+    assert rows["gravity, interaction"] == ("50 mm/s, with friction", "")
+    assert "added alone" in chart("c", found, "t")["c.svg"].decode()
