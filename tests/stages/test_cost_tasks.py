@@ -68,14 +68,14 @@ def test_a_first_answer_has_tighter_and_looser_runs_and_compiles_another_method_
     assert {d.scene.solver.integrator for d in first} == {"dop853"}
     assert designs[cost_design.FIRST + 1].scene.solver.integrator != "dop853"
     fixed = cost_design.neighbours(csj, Setting("rk4", 1e-10, 1e-5))[: cost_design.FIRST]
-    assert any(d.group == "tolerance" for d in fixed)
+    assert any(d.chooses_steps for d in fixed)
     assert len({d.key for d in designs}) == len(designs)
 
 
 def test_fixed_steps_are_compared_with_other_steps_and_with_chosen_ones(csj: Scene):
     designs = cost_design.neighbours(csj, Setting("rk4", 1e-10, 1e-5))
-    assert {d.scene.solver.step for d in designs if d.group == "step"} == {2.5e-6, 5e-6, 1e-5, 2e-5, 4e-5}
-    assert {d.scene.solver.step for d in designs if d.group == "tolerance"} == {None}
+    assert {d.scene.solver.step for d in designs if not d.chooses_steps} == {2.5e-6, 5e-6, 1e-5, 2e-5, 4e-5}
+    assert {d.scene.solver.step for d in designs[1:] if d.chooses_steps} == {None}
 
 
 def test_points_are_measured_alone_with_kernels_compiled_before(study: cost.Study):
@@ -92,14 +92,15 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
     solver = {"solver": {"integrator": "radau", "rtol": 1e-12}}
     converged = scenes.run(edited(swing, solver), place)
     reported = 0
-    for rtol in found["rtol"].values:
-        if np.isnan(found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=rtol)).any():
+    for rtol in found["rtol"].values[found["integrator"].values == "dop853"]:
+        errors = found["error"].isel(run=(found["integrator"] == "dop853") & (found["rtol"] == rtol)).squeeze("run")
+        if np.isnan(errors).any():
             continue  # too loose: the energy balance does not close
         other = scenes.run(edited(swing, {"solver": {"integrator": "dop853", "rtol": float(rtol)}}), place)
         for name in map(str, found["quantity"].values):
             q = parse(name, swing.owners())
             error = quantities.error(other, converged, q) / max(quantities.scale(converged, q), 1e-300)
-            here = found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=rtol, quantity=name)
+            here = errors.sel(quantity=name)
             unsure = float(found.reference_uncertainty.sel(quantity=name))
             if float(here) > 20.0 * unsure:  # of errors near the reference's own nothing is claimed
                 assert 0.5 < error / float(here) < 2.0
@@ -112,7 +113,7 @@ def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, 
     small.first()
     assert [d.key for d in small.points] == ["as it is", "dop853, rtol 1e-06"]  # one run
     assert len(small.undone) == cost_design.FIRST - 2
-    mine, others = small.task().inputs["point0"], study.task().inputs["point0"]
+    mine, others = small.task().inputs["own"], study.task().inputs["own"]
     assert mine.params == others.params
 
 
@@ -140,8 +141,7 @@ def test_peers_change_the_study_but_none_of_its_points(swing: Scene, place: Work
 
 
 def test_integrators_that_are_named_are_compared_and_unknown_ones_refused(csj: Scene):
-    groups = {d.group for d in cost_design.wide(csj, ("rk4",))}
-    assert groups == {"step"}
+    assert {d.chooses_steps for d in cost_design.wide(csj, ("rk4",))} == {False}
     with pytest.raises(InputError, match="did you mean 'radau'"):
         cost_design.wide(csj, ("radua",))
 
@@ -159,7 +159,7 @@ def test_a_method_that_used_up_its_evaluations_is_run_at_no_tighter_tolerance(
     refused.attrs["compile_seconds"] = 1.0
     monkeypatch.setattr(Workplace, "datasets", lambda _, *tasks: [refused] * len(tasks))
     study = cost.Study(swing, place, Budget(1e9), own=1e4, seconds_each=1e-6)
-    first, *tighter = [design for design in cost_design.wide(swing, ("radau",)) if design.group == "tolerance"]
+    first, *tighter = [design for design in cost_design.wide(swing, ("radau",)) if design.chooses_steps]
     study._queue([first, *tighter])
     assert [design.key for design in study.points] == [first.key]
     assert study.undone == tighter

@@ -111,17 +111,14 @@ class Study:
 
     def task(self) -> Task:
         """Return the task of the study of all points so far."""
-        listed = [
-            {"key": d.key, "group": d.group, "factors": dict(d.factors), "input": f"point{k}"}
-            for k, d in enumerate(self.points)
-        ]
-        inputs = {f"point{k}": self.runs[d.key] for k, d in enumerate(self.points)}
+        own, *others = self.points
+        inputs = {"own": self.runs[own.key]} | {f"point{k}": self.runs[d.key] for k, d in enumerate(others)}
         return Task(
             stage="cost",
             scene=self.scene.name,
             run="flexclear.stages.cost_study:run",
             params={
-                "points": listed,
+                "points": [{"key": d.key, **d.setting} for d in others],
                 "quantities": [q.written() for q in self._chosen],
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},

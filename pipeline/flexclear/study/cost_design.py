@@ -50,12 +50,17 @@ class Setting:
 
 @dataclass(frozen=True)
 class Design:
-    """One run: its group and factors (see `post.cost.study`), and the edited scene."""
+    """One run of a study: its name and the edited scene."""
 
     key: str
-    group: str
-    factors: Mapping[str, Any]
     scene: Scene
+
+    @property
+    def setting(self) -> dict[str, Any]:
+        """Integrator, and tolerance or fixed step [s], as of `post.cost.study.Point`."""
+        solver = self.scene.solver
+        chosen = {"rtol": solver.rtol} if self.chooses_steps else {"step": solver.step}
+        return {"integrator": solver.integrator, **chosen}
 
     @property
     def chooses_steps(self) -> bool:
@@ -81,15 +86,16 @@ class Design:
 def neighbours(scene: Scene, own: Setting) -> list[Design]:
     """Return the scene as it is and its neighbours, the most informative first: runs by its own method, since another
     one must be compiled. Only fixed steps, which are no reference, need the other method early."""
-    asis = Design("as it is", "own", {}, edited(scene, {"solver": _own(scene, own), **PLAIN}))
+    fixed = {} if own.step is None else {"step": own.step, "events": scene.solver.events}
+    asis = Design("as it is", _edited(scene, integrator=own.integrator, rtol=own.rtol, **fixed))
     if own.step is not None:
-        mine = [_stepped(scene, own.integrator, own.step * factor) for factor in STEPS]
+        mine = [_design(scene, own.integrator, step=own.step * factor) for factor in STEPS]
         confirming: tuple[float, ...] = CONFIRMING_STEPS
     else:
         tolerances = dict.fromkeys(min(max(own.rtol * factor, TIGHTEST), LOOSEST) for factor in TOLERANCES)
-        mine = [_tolerant(scene, own.integrator, rtol) for rtol in tolerances]
+        mine = [_design(scene, own.integrator, rtol=rtol) for rtol in tolerances]
         confirming = tuple(dict.fromkeys(max(own.rtol * factor, TIGHTEST) for factor in CONFIRMING))
-    others = [_tolerant(scene, other, rtol) for rtol in confirming for other in _others(scene, own)]
+    others = [_design(scene, other, rtol=rtol) for rtol in confirming for other in _others(scene, own)]
     early = 2 if own.step is not None else 4
     return [asis, *mine[:early], *others[:1], *mine[early:4], *others[1:], *mine[4:]]
 
@@ -111,33 +117,19 @@ def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
             raise InputError(f"--integrators {name}", "is not one of the compared integrators", suggestion(name, known))
     result = list[Design]()
     for name in integrators or known:
-        result += [_tolerant(scene, name, rtol) for rtol in INTEGRATORS[name].tolerances]
-        result += [_stepped(scene, name, step) for step in INTEGRATORS[name].steps]
+        result += [_design(scene, name, rtol=rtol) for rtol in INTEGRATORS[name].tolerances]
+        result += [_design(scene, name, step=step) for step in INTEGRATORS[name].steps]
     return result
 
 
-def _tolerant(scene: Scene, integrator: str, rtol: float) -> Design:
-    solver = {"integrator": integrator, "rtol": rtol}
-    return _design(scene, "tolerance", solver, adaptive_integrator=integrator, rtol=rtol)
+def _design(scene: Scene, integrator: str, **setting: float) -> Design:
+    """Return the run by a method at a tolerance `rtol` or with a fixed `step` [s]."""
+    ((name, value),) = setting.items()
+    key = f"{integrator}, {name} {value:g}{' s' if name == 'step' else ''}"
+    return Design(key, _edited(scene, integrator=integrator, **setting))
 
 
-def _stepped(scene: Scene, integrator: str, step: float) -> Design:
-    solver = {"integrator": integrator, "step": step}
-    return _design(scene, "step", solver, fixed_integrator=integrator, step=step)
-
-
-def _design(scene: Scene, group: str, solver: Mapping[str, Any], **factors: Any) -> Design:
-    setting = f"rtol {solver['rtol']:g}" if "rtol" in solver else f"step {solver['step']:g} s"
-    change = {"solver": _solver(scene, **solver), **PLAIN}
-    return Design(f"{solver['integrator']}, {setting}", group, factors, edited(scene, change))
-
-
-def _solver(scene: Scene, **changes: Any) -> dict[str, Any]:
-    """Return the scene's solver with another method and with its own limits."""
+def _edited(scene: Scene, **solver: Any) -> Scene:
+    """Return the scene with another method and with its own limits."""
     own = scene.solver.model_dump(mode="json", exclude_none=True, exclude={*NAMING, "events", "by_need"})
-    return own | changes
-
-
-def _own(scene: Scene, own: Setting) -> dict[str, Any]:
-    fixed = {} if own.step is None else {"step": own.step, "events": scene.solver.events}
-    return _solver(scene, integrator=own.integrator, rtol=own.rtol, **fixed)
+    return edited(scene, {"solver": own | solver, **PLAIN})

@@ -100,19 +100,19 @@ def _loops(run: xr.Dataset) -> list[Check]:
 def _agreement(study: xr.Dataset, remedy: str) -> list[Check]:
     """Check agreement with half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
     result = []
-    for group, method, setting, one in methods(study):
-        distance = one[f"distance_by_{group}"]
-        available = [float(s) for s in study[setting].values if np.isfinite(distance.sel({setting: s})).all()]
+    for method, setting, one in methods(study):
+        known = one.isel(run=np.isfinite(one["distance"].values).all(axis=1))
+        settings = known[setting].values
         if method == study.attrs["own_integrator"]:
-            at = float(study.attrs[f"own_{setting}"])
-            shown = [s for s in available if 0.05 * at < s < 0.9 * at]
+            fraction = settings / float(study.attrs[f"own_{setting}"])
+            shown = np.flatnonzero((fraction > 0.05) & (fraction < 0.9))
         else:
-            shown = [min(available)] if available else []
-        for s in shown:
-            values = distance.sel({setting: s}).values
+            shown = np.arange(len(settings))[-1:]  # the tightest one
+        for k in shown:
+            values = known["distance"].values[k]
             worst = int(np.argmax(values))
             value, unit, which = (float(values[worst]), *(str(study[n].values[worst]) for n in ("unit", "quantity")))
-            name = f"agreement with {method}, {setting} {s:g}{' s' if group == 'step' else ''}"
+            name = f"agreement with {known['run'].values[k]}"
             text = f"{value:.1e} of the {size_of(unit)} of {which}"
             result.append(Check(name, text, f"{AGREEMENT:g}", value < AGREEMENT, remedy))
     return result

@@ -6,10 +6,8 @@ They are relative to the size of each quantity (`quantities.scale`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -18,15 +16,12 @@ from flexclear.artifacts import quantities
 from flexclear.post.overview.curves import size_of
 from flexclear.post.plotting.table import Table
 from flexclear.scene.integrators import INTEGRATORS
-from flexclear.scene.output import Schema, Variable, table
+from flexclear.scene.output import Schema, table
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import SolverError, of_trial
 
-#: groups of points and the factors that span each
-GROUPS: dict[str, tuple[str, ...]] = {
-    "tolerance": ("adaptive_integrator", "rtol"),
-    "step": ("fixed_integrator", "step"),
-}
+#: name of the scene's own run among those of a study
+OWN = "as it is"
 #: the reference must agree with its independent confirmation this many times better than an error it measures
 MARGIN = 10.0
 #: costs of a run
@@ -38,134 +33,113 @@ evaluations | | 1 | right-hand sides evaluated
 peak_memory | | B | largest resident memory of the process of the run
 compile_seconds | | s | time to build and fetch or compile the kernels, not part of the run
 """)
-#: other variables of a run in a study
-KINDS: Schema = COSTS | table("""
+#: other variables of a run in a study, by quantity
+KINDS: Schema = table("""
 error | | 1 | largest error up to the horizon, as a fraction of the quantity's size
 distance | | 1 | largest distance from the scene's own run up to the horizon, as a fraction of the quantity's size
-own_error | | 1 | error of the scene's own run, the reference's uncertainty included, as a fraction of the size
 """)
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One run of a study. group: of GROUPS, or 'own', 'reference' or 'confirmation'; factors: their values."""
+    """One run of a study: its integrator, and its tolerance or its fixed step [s]; the other one is None."""
 
     key: str
-    group: str
-    factors: Mapping[str, Any]
+    integrator: str
+    rtol: float | None = None
+    step: float | None = None
 
 
-def with_reference(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[Point]:
-    """Return the points, and the reference and its confirmation as further points of groups of these names.
+def reference_and_confirmation(
+    points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]
+) -> tuple[str, str]:
+    """Return the names of the reference and of the run that confirms it; the latter is empty where there is none.
 
     The reference is the run at the tightest tolerance. The confirmation is the run that agrees best with it among those
     by other methods: its own error, which is not below the reference's, is part of their distance. Without another
     method, it is the best agreeing run by the same one. Raises SolverError where every run was refused.
     """
-    accepted = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
+    accepted = [(p.rtol, p) for p in points if p.rtol is not None and "refused" not in runs[p.key].attrs]
     if not accepted:
         reasons = "; ".join(dict.fromkeys(_reason(runs[p.key]) for p in points if "refused" in runs[p.key].attrs))
         raise SolverError(f"no run with adaptive steps succeeded, so that no reference exists: {reasons}")
-    best = min(accepted, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
-    others = [p for p in accepted if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
-    others = others or [p for p in accepted if p is not best]
-    until, reference = comparable_until(points, runs), runs[best.key]
+    _, best = min(accepted, key=lambda one: (one[0], -INTEGRATORS[one[1].integrator].order))
+    others = [p for _, p in accepted if p.integrator != best.integrator]
+    others = others or [p for _, p in accepted if p is not best]
+    until, reference = comparable_until(runs), runs[best.key]
 
     def distance(point: Point) -> float:
-        return max(relative_errors(runs[point.key], reference, chosen, until).values(), default=0.0)
+        return max(relative_errors(runs[point.key], reference, chosen, until), default=0.0)
 
-    result = [*points, Point(best.key, "reference", {})]
-    return result + [Point(p.key, "confirmation", {}) for p in sorted(others, key=distance)[:1]]
+    return best.key, next((p.key for p in sorted(others, key=distance)), "")
 
 
 def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
-    """Return the study's dataset; `runs` holds the result of each point, by key.
+    """Return the study's dataset over (run, quantity); `runs` holds the result of each point, by key, and OWN.
 
-    A run that was refused has no values: its entry is NaN and its reason is in `refused`. Raises SolverError when the
-    reference was refused.
+    A run that was refused has no values: its entry is NaN and its reason is in `refused`. Raises SolverError where
+    every run was refused.
     """
-    reference = runs[next(p.key for p in points if p.group == "reference")]
-    if "refused" in reference.attrs:
-        raise SolverError(
-            f"no comparison: the reference ({_keys_of(points, 'reference')}) is refused: {reference.attrs['refused']}"
-        )
-    until = comparable_until(points, runs)
-    scales = {q: quantities.scale(reference, q) for q in chosen}
-    data: dict[str, Any] = {"scale": (("quantity",), np.array([scales[q] for q in chosen]))}
-    coordinates: dict[str, Any] = {
-        "quantity": [q.name for q in chosen],
-        "unit": ("quantity", [quantities.unit(reference, q) for q in chosen]),
+    best, confirmation = reference_and_confirmation(points, runs, chosen)
+    reference, asis, until = runs[best], runs.get(OWN), comparable_until(runs)
+    floor = np.full(len(chosen), np.nan)
+    if confirmation:
+        floor = relative_errors(runs[confirmation], reference, chosen, until)
+    made = [(k, runs[p.key]) for k, p in enumerate(points) if "refused" not in runs[p.key].attrs]
+    data = {name: np.full((len(points), *[len(chosen)] * (name in KINDS)), np.nan) for name in (*KINDS, *COSTS)}
+    for k, run in made:
+        data["error"][k] = relative_errors(run, reference, chosen, until)
+        if asis is not None:
+            data["distance"][k] = relative_errors(run, asis, chosen, until)
+        for name in COSTS:
+            data[name][k] = cost(run, name)
+    described = {name: {"units": one.units, "long_name": one.long_name} for name, one in (COSTS | KINDS).items()}
+    variables = {
+        name: (("run", "quantity")[: values.ndim], values, described[name]) for name, values in data.items()
+    } | {
+        "scale": (("quantity",), [quantities.scale(reference, q) for q in chosen]),
+        "reference_uncertainty": (("quantity",), floor, {"units": "1", "long_name": "uncertainty of the reference"}),
     }
-
-    def errors(run: xr.Dataset, other: xr.Dataset = reference) -> np.ndarray:
-        return np.array(list(relative_errors(run, other, chosen, until).values()))
-
-    asis = next((runs[p.key] for p in points if p.key == "as it is"), None)
-    confirmations = [runs[p.key] for p in points if p.group == "confirmation"]
-    confirmed = [errors(run) for run in confirmations if "refused" not in run.attrs]
-    floor = np.max(confirmed, axis=0) if confirmed else np.full(len(chosen), np.nan)
-    data["reference_uncertainty"] = (("quantity",), floor)
-    for group, factors in GROUPS.items():
-        mine = [p for p in points if p.group == group]
-        if not mine:
-            continue
-        every = {factor: {p.factors[factor] for p in mine} for factor in factors}
-        values = {name: sorted(of, reverse=all(isinstance(v, float) for v in of)) for name, of in every.items()}
-        coordinates |= values
-        over, each = partial(_over_factors, values, mine, runs), (len(chosen),)
-        distance = over(lambda run: np.nan if asis is None else errors(run, asis), each)
-        data[f"error_by_{group}"] = ((*factors, "quantity"), over(errors, each))
-        data[f"distance_by_{group}"] = ((*factors, "quantity"), distance)
-        data |= {f"{name}_by_{group}": (factors, over(partial(cost, name=name))) for name in COSTS}
-    if asis is not None and "refused" not in asis.attrs:
-        data["own_error"] = (("quantity",), errors(asis) + np.nan_to_num(floor))
     attributes = {
-        "reference": _keys_of(points, "reference"),
-        "confirmation": _keys_of(points, "confirmation"),
+        "reference": best,
+        "confirmation": confirmation,
         "horizon": until if np.isfinite(until) else "none",
         "end": float(reference["time"].values[-1]),
         "refused": "; ".join(f"{p.key}: {_reason(runs[p.key])}" for p in points if "refused" in runs[p.key].attrs),
         "Conventions": "CF-1.11",
     }
-    result = xr.Dataset(data, coords=coordinates, attrs=attributes)
-    for name in result.data_vars:
-        kind = str(name).rpartition("_by_")[0] or str(name)
-        one = KINDS.get(kind, Variable((), "1", kind.replace("_", " ")))
-        result[name].attrs = {"units": one.units, "long_name": one.long_name}
-    return result
+    if asis is not None:
+        error = relative_errors(asis, reference, chosen, until) + np.nan_to_num(floor)
+        words = "error of the scene's own run, the reference's uncertainty included, as a fraction of the size"
+        variables["own_error"] = (("quantity",), error, {"units": "1", "long_name": words})
+        attributes |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
+    coordinates = {
+        "run": [p.key for p in points],
+        "integrator": ("run", [p.integrator for p in points]),
+        "rtol": ("run", [np.nan if p.rtol is None else p.rtol for p in points]),
+        "step": ("run", [np.nan if p.step is None else p.step for p in points], {"units": "s"}),
+        "quantity": [q.name for q in chosen],
+        "unit": ("quantity", [quantities.unit(reference, q) for q in chosen]),
+    }
+    return xr.Dataset(variables, coordinates, attributes)
 
 
-def methods(study: xr.Dataset) -> Iterator[tuple[str, str, str, xr.Dataset]]:
-    """Yield group, integrator, name of its setting, and the study of that integrator alone, for each integrator."""
-    for group, (method, setting) in GROUPS.items():
-        for name in study[method].values if f"error_by_{group}" in study else ():
-            yield group, str(name), setting, study.sel({method: name})
+def methods(study: xr.Dataset) -> Iterator[tuple[str, str, xr.Dataset]]:
+    """Yield integrator, name of its setting, and its runs, the loosest first, for each integrator."""
+    for setting in ("rtol", "step"):
+        mine = study.isel(run=np.isfinite(study[setting].values)).sortby(setting, ascending=False)
+        for name in dict.fromkeys(mine["integrator"].values.tolist()):
+            yield name, setting, mine.isel(run=mine["integrator"].values == name)
 
 
-def is_resolved(study: xr.Dataset, group: str) -> xr.DataArray:
-    """Return True where the reference can measure an error; same shape as ``error_by_<group>``."""
-    return study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
+def is_resolved(study: xr.Dataset) -> xr.DataArray:
+    """Return True where the reference can measure an error, over (run, quantity)."""
+    return study["error"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
 
 
 def _reason(refused: xr.Dataset) -> str:
     """Return why a run was refused, without the other warnings and remedies."""
     return of_trial(str(refused.attrs["refused"]).partition(";")[0])
-
-
-def _over_factors(
-    values: Mapping[str, list[Any]],
-    points: Sequence[Point],
-    runs: Mapping[str, xr.Dataset],
-    of: Callable[[xr.Dataset], Any],
-    inner: tuple[int, ...] = (),
-) -> np.ndarray:
-    """Return `of` each run (shape inner) over the values of the factors; NaN for a missing or refused run."""
-    result = np.full((*map(len, values.values()), *inner), np.nan)
-    for point in points:
-        if "refused" not in runs[point.key].attrs:
-            index = tuple(known.index(point.factors[factor]) for factor, known in values.items())
-            result[index] = of(runs[point.key])
-    return result
 
 
 def cost(run: xr.Dataset, name: str) -> float:
@@ -178,38 +152,24 @@ def cost(run: xr.Dataset, name: str) -> float:
     return float(run.attrs[name])
 
 
-def recording(study: xr.Dataset) -> float:
-    """Return processor time of the record of one run [s]: the same for each integration's rows, so one median."""
-    times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in GROUPS
-             if f"recording_seconds_by_{group}" in study]  # fmt: skip
-    values = np.concatenate([*times, [np.nan]])
-    return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
+def relative_errors(run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity], until: float) -> np.ndarray:
+    """Return the largest errors up to a time [s] as fractions of the quantities' sizes."""
+    return np.array(
+        [relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen]
+    )
 
 
-def relative_errors(
-    run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity], until: float
-) -> dict[str, float]:
-    """Return the largest errors up to a time [s] as fractions of the quantities' sizes, by name."""
-    return {
-        q.name: relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen
-    }
-
-
-def comparable_until(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
+def comparable_until(runs: Mapping[str, xr.Dataset]) -> float:
     """Return the time up to which pointwise errors mean something [s]: the least horizon of the runs.
 
     Infinite where no run has a horizon.
     """
-    return min((float(runs[p.key]["horizon"]) for p in points if "horizon" in runs[p.key]), default=np.inf)
+    return min((float(run["horizon"]) for run in runs.values() if "horizon" in run), default=np.inf)
 
 
 def relative(error: float, scale: float) -> float:
     """Return an error as a fraction of a size; the error itself for a size of zero."""
     return error / scale if scale > 0.0 else error
-
-
-def _keys_of(points: Sequence[Point], group: str) -> str:
-    return "; ".join(p.key for p in points if p.group == group)
 
 
 def sentences(study: xr.Dataset) -> str:
@@ -316,19 +276,17 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 def choices(study: xr.Dataset) -> list[Choice]:
     """Return all ways to integrate whose error is known."""
-    choices = []
-    uncertain = study["reference_uncertainty"].fillna(0.0)
-    for group, method, setting, mine in methods(study):
-        for s in study[setting].values:
-            one = mine.sel({setting: s})
-            error = one[f"error_by_{group}"] + uncertain
-            if not np.isfinite(error).all():
-                continue
-            worst = str(study["quantity"].values[int(np.argmax(error.values))])
-            evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
-            unit = " s" if setting == "step" else ""
-            choices.append(Choice(f"{method}, {setting} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
-    return choices
+    errors = study["error"].values + study["reference_uncertainty"].fillna(0.0).values
+    return [
+        Choice(
+            str(study["run"].values[k]),
+            float(study["evaluations"][k]),
+            float(study["cpu_seconds"][k]),
+            float(errors[k].max()),
+            str(study["quantity"].values[int(np.argmax(errors[k]))]),
+        )
+        for k in np.flatnonzero(np.isfinite(errors).all(axis=1))
+    ]
 
 
 def _notes(study: xr.Dataset) -> list[str]:
@@ -349,7 +307,7 @@ def _confirmation_sentence(study: xr.Dataset) -> str:
     uncertain, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
     reference = f"Reference: {study.attrs['reference']}. "
     if not np.isfinite(uncertain).all():
-        why = "was refused" if np.isnan(uncertain).any() else "has another number of impacts"
-        return f"{reference}Not confirmed: {f'{by} {why}' if by else 'there is no second run'}."
+        why = f"{by} has another number of impacts" if by else "there is no second run"
+        return f"{reference}Not confirmed: {why}."
     worst = str(study["quantity"].values[int(np.argmax(uncertain))])
     return f"{reference}Confirmed by {by}, which differs by at most {uncertain.max():.1e} ({worst})."

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flexclear.post.cost.study import MARGIN, is_resolved, methods, recording
+from flexclear.post.cost.study import MARGIN, is_resolved, methods
 from flexclear.post.plotting.style import GRID, INK, SOFT, files, heading, panels, scale_of, set_plain_numbers, style
 from flexclear.scene.integrators import INTEGRATORS
 
@@ -51,7 +51,7 @@ def make(
     """Draw ``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
     drawn = curves(study)
-    recorded = recording(study)
+    recorded = float(study["recording_seconds"].median())
     with style():
         figure, axes = panels(len(chosen), COLUMNS, 10.5, 1.1, 2.7)
         for k, ax in enumerate(axes):
@@ -66,10 +66,8 @@ def make(
 def curves(study: xr.Dataset) -> list[Curve]:
     """Return the curves of all integrators of a study, those with a tolerance and those with a step."""
     return [
-        Curve(
-            name, one[f"cpu_seconds_by_{group}"].values, one[f"error_by_{group}"].values, is_resolved(one, group).values
-        )
-        for group, name, _, one in methods(study)
+        Curve(name, one["cpu_seconds"].values, one["error"].values, is_resolved(one).values)
+        for name, _, one in methods(study)
     ]
 
 
