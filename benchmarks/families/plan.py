@@ -26,7 +26,7 @@ from flexclear.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UNDECIDED, 
 from flexclear.scene.load import edited
 from flexclear.scene.quantity import Quantity, parse
 from flexclear.scene.schema import Scene
-from flexclear.stages import effect_plan, simulation, watched_quantities
+from flexclear.stages import effect_plan, simulation, variant_runs
 from flexclear.stages.workplace import check, open_workplace
 from flexclear.study import plan
 from flexclear.study.members import MEMBERS
@@ -145,14 +145,14 @@ def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
 
 def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any], members: int) -> tuple[Any, float]:
     """Return the watched quantities of a scene, and the processor time of one run [s]."""
-    plain = watched_quantities.plain(scene)
+    plain = variant_runs.plain(scene)
     rigid = {name: data for name, data in inputs.items() if name.removeprefix("rigid/") in plain.meshed_bodies()}
     filled = simulation.rebuild(simulation.params(plain), rigid)
     bundles = {name: data for name, data in simulation.bundles(inputs).items() if name in filled.flexible()}
     end = filled.time.start + WARM * (filled.time.end - filled.time.start)
-    watched_quantities.watch(edited(filled, {"time.end": end}), bundles, chosen, 0)
+    variant_runs.watch(edited(filled, {"time.end": end}), bundles, chosen, 0)
     begun = time.process_time()
-    found = watched_quantities.watch(filled, bundles, chosen, members)
+    found = variant_runs.watch(filled, bundles, chosen, members)
     spent = time.process_time() - begun
     loose = bool(filled.contacts() or filled.stop)
     return found, spent / (members if loose else 1)

@@ -13,10 +13,10 @@ from typing import Any
 from benchmarks.family import Case, Family, Record, each
 from flexclear.artifacts.store import write_dataset
 from flexclear.post.plotting.table import pipe_table
-from flexclear.stages.cost_point import peak_memory
 from flexclear.structure.kinds import kind
 from flexclear.structure.modes import bundle
 from flexclear.structure.modes.solution import solve
+from flexclear.system.platforms import peak_memory
 
 MATERIAL = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}
 FRAMES = {name: {"on": {"region": region}, "tie": "mean"} for name, region in (("bottom", "start"), ("top", "end"))}

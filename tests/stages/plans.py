@@ -16,7 +16,7 @@ from flexclear.scene import variants
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene
-from flexclear.stages import effect_plan, simulation, watched_quantities
+from flexclear.stages import effect_plan, simulation, variant_runs
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
 from flexclear.system.progress import silent
@@ -48,7 +48,7 @@ def pilot(scene: Scene) -> Pilot:
     outcome = place.bring(list(task.inputs.values()), 1)
     inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
     dropped = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
-    bare = watched_quantities.plain(variants.without(scene, dropped))
+    bare = variant_runs.plain(variants.without(scene, dropped))
     rigid = {name: inputs[name] for name in Graph(bare, shown=False).bodies()}
     return Pilot(scene, integrate(simulation.rebuild(simulation.params(bare), rigid), {}, silent), inputs)
 

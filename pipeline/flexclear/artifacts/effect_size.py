@@ -129,7 +129,7 @@ def _whole(quantity: Quantity) -> Recorded:
 def point_of_members(
     stored: Sequence[xr.Dataset], owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]
 ) -> Point:
-    """Return the point of all members in artifacts of `stages.watched_quantities`."""
+    """Return the point of all members in artifacts of `stages.variant_runs`."""
     kept = compared_values(owners, chosen)
     return join_points([(unpack_points(one, kept)["point"], int(one.attrs["members"])) for one in stored])
 

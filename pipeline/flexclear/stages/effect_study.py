@@ -26,7 +26,7 @@ Names = frozenset[str]
 class Integrated:
     """Runs whose distance is the error of the time integration of members.
 
-    runs: ``own``, the scene's, and ``tight``, at a tighter tolerance (`stages.cost_point`); empty without one.
+    runs: ``own``, the scene's, and ``tight``, at a tighter tolerance (`variant_runs.measure`); empty without one.
     looser: the members' tolerance as a multiple of the scene's, to which their errors are proportional.
     """
 
@@ -44,7 +44,7 @@ def task(
 ) -> Task:
     """Return the task of `run`.
 
-    variants, watched: scenes and their tasks (`stages.watched_quantities`), by the effects that they lack.  params:
+    variants, watched: scenes and their tasks (`stages.variant_runs`), by the effects that they lack.  params:
     other ones of `run`.
     """
     gone = frozenset[str]().union(*variants)
@@ -77,7 +77,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     params: those of `task`; `removed`, the effects that go with each one; `members`, their number with which each one
     is compared; `words` of each; those `undone`, in words; `added`, the effects (name, kind, within, joint) that are
-    also added and combined in pairs. inputs: ``variant<k>/<n>``, as in `watched_quantities`, and those of `Integrated`.
+    also added and combined in pairs. inputs: ``variant<k>/<n>``, as of `variant_runs.members`, and those of
+    `Integrated`.
     """
     from flexclear.post.answers import effect_answer, effect_sizes
 

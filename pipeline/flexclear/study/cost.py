@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.dynamics.analyses import require_without_events
 from flexclear.scene.load import edited
-from flexclear.stages import kernels
+from flexclear.stages import kernels, variant_runs
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace
 from flexclear.study import cost_design, members
@@ -41,7 +41,7 @@ TABLE, FIGURE = "price.md", "work_precision"
 class Study:
     """A cost study while its points are computed, each from the cache where it exists.
 
-    compiled: kernels, by what runs on them.
+    compiled: identities of compiled kernels.
     evaluations: those of runs, by integrator and tolerance; at least so many where they were used up.  own,
     seconds_each: evaluations of the scene's own run, and the time of each.
     """
@@ -51,7 +51,7 @@ class Study:
     budget: Budget
     integrators: Collection[str] = ()
     peers: Sequence[Track] = ()
-    compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
+    compiled: set[tuple[str, ...]] = field(default_factory=set)
     runs: dict[str, Task] = field(default_factory=dict)
     points: list[cost_design.Design] = field(default_factory=list)
     undone: list[cost_design.Design] = field(default_factory=list)
@@ -157,13 +157,13 @@ class Study:
         elif self.own:
             limit = min(self.scene.solver.evaluations, self._evaluation_limit())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
-        first, compiled = kernels.kernel_identity(design.scene) not in self.compiled, self._kernels(design)
-        task = members.point(design, members.names_of(self.scene), compiled, run)
-        record, *kernel = self.workplace.datasets(*([task, compiled] if first else [task]))
+        task = variant_runs.measured(design.scene, design.key, members.names_of(self.scene), run)
+        (record,) = self.workplace.datasets(task)
+        self.compiled.add(kernels.kernel_identity(design.scene))
         self.runs[design.key] = task
         self.points.append(design)
         solver, limited = design.scene.solver, "evaluations" in record.attrs.get("refused", "")
-        spent = POINT + sum(float(one.attrs["compile_seconds"]) for one in kernel)
+        spent = POINT + float(record.attrs["compile_seconds"])
         if limited:
             spent += self._evaluation_limit() * self.seconds_each
         elif "refused" not in record.attrs:
@@ -180,12 +180,6 @@ class Study:
         affordable = max(MOST_EVALUATIONS * self.own, self.budget.seconds / self.seconds_each / MOST_EVALUATIONS, 1e5)
         below = 10 ** math.floor(math.log10(affordable))
         return next(factor * below for factor in (1, 2, 5, 10) if factor * below >= affordable)
-
-    def _kernels(self, design: cost_design.Design) -> Task:
-        shared = kernels.kernel_identity(design.scene)
-        if shared not in self.compiled:
-            self.compiled[shared] = kernels.task(design.scene, Graph(design.scene, shown=False).bodies())
-        return self.compiled[shared]
 
 
 def bring(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeVar
 from flexclear.scene.integrators import DEFAULT, VIBRATING
 from flexclear.scene.load import edited
 from flexclear.scene.solver import of_run
-from flexclear.stages import kernels, simulation, watched_quantities
+from flexclear.stages import variant_runs
 from flexclear.stages.effect_study import Integrated
 from flexclear.stages.graph import Graph
 from flexclear.study.cost_design import Design, Setting, neighbours
@@ -107,7 +107,7 @@ class Members:
         """Return the points of variants over this number of members; of one run where a variant has no contacts."""
         from flexclear.artifacts.effect_size import point_of_members
 
-        tasks = {name: watched_quantities.tasks(scene, self.chosen, members) for name, scene in variants.items()}
+        tasks = {name: variant_runs.tasks(scene, self.chosen, members) for name, scene in variants.items()}
         made = iter(self.workplace.made(*(task for few in tasks.values() for task in few)))
         points = {}
         for name, few in tasks.items():
@@ -128,27 +128,6 @@ def setting_of(scene: Scene, workplace: Workplace) -> Setting:
     (run,) = workplace.datasets(Graph(scene, shown=False).simulate)
     own = of_run(scene.solver, scene.by_need(), run.attrs)
     return Setting(*own, scene.solver.step, int(run.attrs["evaluations"]))
-
-
-def point(design: Design, names: Sequence[str], compiled: Task, run: Task | None = None) -> Task:
-    """Return the task of `stages.cost_point` on a design's scene, which keeps these quantities.
-
-    compiled: the task of its kernels.  run: that of the scene's own run, where this is the same one.
-    """
-    return Task(
-        stage="cost-point",
-        scene=design.scene.name,
-        part=design.key,
-        run="flexclear.stages.cost_point:run",
-        params={"simulate": simulation.params(design.scene), "quantities": list(names)},
-        inputs={
-            **Graph(design.scene, shown=False).bodies(),
-            "kernels": compiled,
-            **({} if run is None else {"run": run}),
-        },
-        code=("flexclear.stages.kernels", *simulation.CODE),
-        exclusive=True,
-    )
 
 
 def names_of(scene: Scene, others: Iterable[Quantity] = ()) -> list[str]:
@@ -173,10 +152,7 @@ def tighter_design(scene: Scene, own: Setting) -> Design | None:
 def tighter(scene: Scene, own: Setting, others: Iterable[Quantity] = ()) -> Task | None:
     """Return the point of `tighter_design`: its distance from the scene's run is the run's error."""
     design = tighter_design(scene, own)
-    if design is None:
-        return None
-    first = neighbours(scene, own)[0].scene  # a study compiles the kernels for this one
-    return point(design, names_of(scene, others), kernels.task(first, Graph(first, shown=False).bodies()))
+    return None if design is None else variant_runs.measured(design.scene, design.key, names_of(scene, others))
 
 
 def integrated(scene: Scene, own: Setting, *, tight: bool = False) -> Integrated:
