@@ -9,11 +9,17 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
 
 from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
 from flexclear.artifacts.paths import results_root
+from flexclear.post.cost import work_precision
 from flexclear.post.cost.study import sentences
 from flexclear.post.plotting.table import Table, as_markdown, from_markdown
 from flexclear.scene.load import load_scene
@@ -52,12 +58,34 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     peers = exudyn.points([r for s in log.latest(log.FOLDER / "exudyn.jsonl") for r in s.records])
     for case in cases:
         scene = load_scene(find_scene(case.name))
-        study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY)
-        file = f"{cost.FIGURE}.png"
-        picture = {"file": file, "sha256": hashlib.sha256(study.read(file)).hexdigest()}
+        study = cost.measure_costs(scene, place, budget=STUDY)
+        data, file = study.dataset(), f"{cost.FIGURE}.png"
+        others = curves_of(data, peers.get(case.name, ()))
+        drawn = work_precision.make(cost.FIGURE, data, f"Error against cost: {scene.title}", others)[file]
+        _picture(case.name).parent.mkdir(parents=True, exist_ok=True)
+        _picture(case.name).write_bytes(drawn)
+        picture = {"file": file, "sha256": hashlib.sha256(drawn).hexdigest()}
         picture |= {"picture": "Error against cost", "path": f"accuracy/{case.name.replace('/', '_')}_{file}"}
         table = asdict(from_markdown(study.text(cost.TABLE)))
-        yield case, [{"advice": sentences(study.dataset())}, picture, {"table": table}]
+        yield case, [{"advice": sentences(data)}, picture, {"table": table}]
+
+
+def _picture(scene: str) -> Path:
+    """Return the path of the picture of a scene, with other programs' runs, among the results."""
+    return results_root() / "benchmarks" / scene / f"{cost.FIGURE}.png"
+
+
+def curves_of(study: xr.Dataset, tracks: Sequence[Mapping[str, Any]]) -> list[work_precision.Curve]:
+    """Return curves of another program's runs. tracks: name, seconds [s] and errors [SI] by quantity."""
+    lines = []
+    for track in tracks:
+        seconds = np.array(track["seconds"], dtype=float)
+        error = np.full((len(seconds), study.sizes["quantity"]), np.nan)
+        for k, name in enumerate(study["quantity"].values):
+            if str(name) in track["error"]:
+                error[:, k] = np.array(track["error"][str(name)], dtype=float) / float(study["scale"][k])
+        lines.append(work_precision.Curve(track["name"], seconds, error, np.isfinite(error)))
+    return lines
 
 
 def show(records: list[Record]) -> str:
@@ -91,7 +119,7 @@ def files(records: list[Record]) -> dict[str, bytes]:
     """Return the pictures that still exist among the results; those of other studies have other digests."""
     found = {}
     for r in records:
-        file = results_root() / "cost" / r["case"] / r.get("file", "")
+        file = _picture(r["case"])
         if "picture" in r and file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() == r["sha256"]:
             found[r["path"]] = file.read_bytes()
     return found

@@ -62,7 +62,7 @@ def _measured(case: Case) -> list[Record]:
 
 def _influences() -> list[Record]:
     scene = edited(load_scene(scenes.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
-    found = effects.examine(scene, open_workplace(), pairs=True).dataset()
+    found = effects.examine_effects(scene, open_workplace(), pairs=True).dataset()
     records = []
     for quantity in WATCHED:
         part = found.sel(quantity=quantity)

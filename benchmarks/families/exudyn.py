@@ -368,7 +368,7 @@ def _run_row(run: Record) -> list[str]:
 
 
 def points(records: list[Record]) -> dict[str, list[dict[str, Any]]]:
-    """Return, by scene of a cost study, runs of `cost.bring`: seconds [s] and errors [SI] by step."""
+    """Return Exudyn's runs by scene of a cost study: seconds [s] and errors [SI] by step."""
     versions = {r["case"]: r["version"] for r in records if "version" in r}
     return {
         comparison.study: list(_tracks(runs, f"Exudyn {versions[case]}", comparison.note))

@@ -75,7 +75,9 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
             decided, planning = _planned(params, inputs)
     except FlexclearError as error:
         return {**drawing, "verdict": REFUSED, "reason": str(error)}
-    planned = plan.of(scene, dataset(decided, scene.title, {q.name: q.unit for q in scene.requested_quantities()}))
+    planned = plan.planned_scene(
+        scene, dataset(decided, scene.title, {q.name: q.unit for q in scene.requested_quantities()})
+    )
     full = edited(scene, {"accuracy": None})
     chosen = [parse(name, scene.owners()) for name in made.record["wanted"]]
     spent = [time.process_time()]

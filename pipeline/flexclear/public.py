@@ -202,11 +202,11 @@ def wear(scene: AnyScene, cycles: float, *, per_run: float = 1.0, tolerance: flo
     clearance; by default that of ``flexclear wear``.  Finished runs come from the cache.  Raises FlexclearError:
     InputError for a scene without wear.
     """
-    from flexclear.study.wear import TOLERANCE, bring
+    from flexclear.study.wear import TOLERANCE, wear_surfaces
 
     allowed = TOLERANCE if tolerance is None else tolerance
     scenes.examine(one := _loaded(scene))
-    return bring(one, open_workplace(), cycles, per_run=per_run, tolerance=allowed).dataset()
+    return wear_surfaces(one, open_workplace(), cycles, per_run=per_run, tolerance=allowed).dataset()
 
 
 def sensitivities(scene: AnyScene, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
@@ -383,7 +383,7 @@ def report(scene: AnyScene, budget: str | float | None = None, *, answers: bool 
     given = None if budget is None else seconds(budget, "budget")
     scenes.examine(one := _loaded(scene))
     graph = Graph(one, shown=one.path is None or scenes.as_in_its_file(one))
-    return page.of_scene(graph, open_workplace(), budget=given, answers=answers)
+    return page.write_report(graph, open_workplace(), budget=given, answers=answers)
 
 
 def open(scene: AnyScene) -> xr.DataTree:

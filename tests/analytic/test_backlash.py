@@ -9,10 +9,13 @@ import pytest
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.sensitivity.dataset import sensitivities
+from flexclear.post.answers.effect_sizes import IDEAL
 from flexclear.scene.ends import Gear
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import effects, ideal
+from flexclear.study import compare
+from flexclear.study.effects import removals
 from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, impacts
@@ -163,6 +166,10 @@ def test_the_play_of_teeth_is_an_effect_that_the_ideal_mechanism_lacks() -> None
     assert ideal(loose).gear["mesh"] == Gear(first="w0", second="w1", ratio=RATIO)
     assert loose.stop_ends() == ["mesh.lower", "mesh.upper"]
     assert ideal(loose).stop_ends() == []
+    assert [one.name for one in compare.ideal_scenes(loose, "clearance")] == [f"{loose.name} without clearance"]
+    # nothing else is ideal there, so that it is listed as that effect
+    together, alone = (removals(loose, effects(loose), IDEAL)[name] for name in (IDEAL, "gear.mesh.backlash"))
+    assert together == alone == {"gear.mesh.backlash"}
 
 
 HERTZ = {"law": "hertz", "stiffness": 1.0}

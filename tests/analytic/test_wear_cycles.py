@@ -16,7 +16,7 @@ from flexclear import dynamics
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
 from flexclear.stages.workplace import Workplace, open_workplace
-from flexclear.study.wear import Study, Wearing, arcs, bring, start
+from flexclear.study.wear import Study, Wearing, initial_depths, spread_over_arcs, wear_surfaces
 from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE
@@ -43,12 +43,12 @@ class OneSided(Study):
 
     runs, penetration = 0, 1e-7
 
-    def _evaluated(self, cycles: float, depths: dict[str, np.ndarray]) -> Wearing:
+    def _run_worn(self, cycles: float, depths: dict[str, np.ndarray]) -> Wearing:
         type(self).runs += 1
         work = np.zeros((1, 4 * depths["hole"].shape[2]))
         work[0, 3 * work.shape[1] // 4 :][:2] = 0.5  # on either side of a line between two sectors
         rates = np.zeros_like(depths["hole"])
-        rates[0] = 1e-9 * arcs(work, depths["hole"][0], CLEARANCE, self.penetration)
+        rates[0] = 1e-9 * spread_over_arcs(work, depths["hole"][0], CLEARANCE, self.penetration)
         return Wearing(cycles, depths, 0.0, None, {"hole": rates})  # type: ignore[arg-type]
 
 
@@ -71,7 +71,7 @@ def test_a_pin_that_stays_at_one_side_wears_a_groove_of_its_own_shape(sectors: i
     study = OneSided(scene(sectors=sectors, outer_share=1.0), None, tolerance=0.02)  # type: ignore[arg-type]
     sector = 2.0 * np.pi / sectors
     cycles = 0.35 * CLEARANCE / sector / 1e-9
-    study.go_on(cycles)
+    study.wear_until(cycles)
     groove = study.steps[-1].depths["hole"][0, 0]
     assert groove.sum() == pytest.approx(1e-9 * cycles, rel=1e-12)
     depth = lens(1e-9 * cycles * sector)
@@ -90,7 +90,7 @@ def test_errors_of_the_steps_fall_with_the_tolerance_and_volumes_stay() -> None:
     found = []
     for tolerance in (0.04, 0.01):
         study = OneSided(scene(outer_share=1.0), None, tolerance=tolerance)  # type: ignore[arg-type]
-        study.go_on(1e5)
+        study.wear_until(1e5)
         assert all(one.error <= tolerance for one in study.steps)
         assert [one.cycles for one in study.steps] == sorted(one.cycles for one in study.steps)
         found.append(len(study.steps))
@@ -103,7 +103,7 @@ def test_a_pin_that_turns_wears_all_around_in_proportion_to_the_cycles(place: Wo
     The force is the weight whatever the clearance; the speed at the surface falls with the radius.
     """
     cycles = 0.3 * CLEARANCE / PER_CYCLE
-    made = bring(scene(outer_share=0.0), place, cycles, tolerance=0.05).dataset()
+    made = wear_surfaces(scene(outer_share=0.0), place, cycles, tolerance=0.05).dataset()
     depth = made["depth_inner"].values[-1, 0, 0]
     fell = 0.3 * CLEARANCE / RADIUS
     # rows 1/36 of a turn apart spread the work unevenly over sectors by one in 16 pieces of a row's step
@@ -117,11 +117,11 @@ def test_a_pin_that_turns_wears_all_around_in_proportion_to_the_cycles(place: Wo
 
     # again, and from its own file: nothing runs, and the surfaces are those of the last step
     ran = len(list(place.store.root.rglob("*.nc")))
-    again = bring(scene(outer_share=0.0), place, cycles, tolerance=0.05)
+    again = wear_surfaces(scene(outer_share=0.0), place, cycles, tolerance=0.05)
     assert again.dataset().identical(made)
     assert len(list(place.store.root.rglob("*.nc"))) == ran
     went_on = scene(outer_share=0.0, profile=str(again.folder / "wear.nc"))
-    assert start(went_on.joint["hole"], "hole") == pytest.approx(
+    assert initial_depths(went_on.joint["hole"], "hole") == pytest.approx(
         np.stack([made["depth_outer"].values[-1, 0], made["depth_inner"].values[-1, 0]]), rel=0.0
     )
 
@@ -133,7 +133,7 @@ def test_a_crank_pin_wears_its_journal_where_the_rod_pushes_and_pulls(place: Wor
     Depths per cycle fall as the grooves widen (a constant volume over more area), and forces grow with the gap.
     """
     scene = load_scene(TREE / "scenes" / "gallery" / "worn_crank.toml")
-    made = bring(scene, place, 2e5, tolerance=0.04).dataset().sel(worn="pin")
+    made = wear_surfaces(scene, place, 2e5, tolerance=0.04).dataset().sel(worn="pin")
     last, rates = made["depth_outer"].values[-1, 0], made["rate_outer"].values[:, 0].max(axis=1)
     deep = np.flatnonzero(last > 0.5 * last.max())
     angles = 10.0 * deep + 5.0
@@ -158,14 +158,14 @@ def test_a_crank_pin_wears_its_journal_where_the_rod_pushes_and_pulls(place: Wor
 )
 def test_numbers_that_are_not_above_zero_are_refused(changes: dict, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        bring(scene(), None, **changes)  # type: ignore[arg-type]
+        wear_surfaces(scene(), None, **changes)  # type: ignore[arg-type]
 
 
 def test_a_scene_without_wear_is_refused() -> None:
     table = hanging()
     del table["joint"]["hole"]["wear"]
     with pytest.raises(InputError, match="no joint has wear"):
-        bring(Scene.model_validate(table), None, 1.0)  # type: ignore[arg-type]
+        wear_surfaces(Scene.model_validate(table), None, 1.0)  # type: ignore[arg-type]
 
 
 def worn(shape: tuple[int, int], radius: float, clearance: float, height: float) -> dict[str, Any]:

@@ -301,7 +301,8 @@ for solver in ({"rtol": 1e-6}, {"step": 0.004}):
     scene = load_scene("new.toml", {"solver": {"integrator": "heun", **solver}})
     run = dynamics.simulate(scene, {}, silent)
     ends.append([run.attrs["method"], *run.position.sel(body="bob").values[-1].tolist()])
-designs = [("tolerance" if d.chooses_steps else "step", d.scene.solver) for d in cost_design.wide(own, ("heun",))]
+heun = cost_design.all_methods(own, ("heun",))
+designs = [("tolerance" if d.chooses_steps else "step", d.scene.solver) for d in heun]
 print(json.dumps({
     "schema": scene_schema()["$defs"]["Solver"]["properties"]["integrator"]["enum"],
     "ends": ends,

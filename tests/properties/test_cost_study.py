@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from benchmarks.families import accuracy
 from flexclear.artifacts import quantities
 from flexclear.post.cost import study as cost_study
 from flexclear.post.cost import work_precision
-from flexclear.post.cost.study import Point, assemble, is_resolved
+from flexclear.post.cost.study import MeasuredRun, assemble, is_resolved
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import SolverError
 
@@ -49,13 +50,13 @@ REFUSED = xr.Dataset(attrs={"refused": "it blew up; take another"})
 def study(uncertainty: float = 1e-8, horizon: float | None = None, **changed: xr.Dataset):
     """dop853 at four tolerances, of which the tightest is the reference, radau, which confirms it, and rk4 at two steps
     of which one is refused; some runs changed."""
-    points = [Point("best", "dop853", rtol=1e-12), Point("other", "radau", rtol=1e-9)]
+    points = [MeasuredRun("best", "dop853", rtol=1e-12), MeasuredRun("other", "radau", rtol=1e-9)]
     runs = {"best": run(0.0, horizon=horizon, evaluations=1000), "other": run(uncertainty, evaluations=1000)}
     for k, (rtol, error) in enumerate(((1e-3, 1e-2), (1e-6, 1e-5), (1e-9, 1e-7))):
-        points.append(Point(f"d{k}", "dop853", rtol=rtol))
+        points.append(MeasuredRun(f"d{k}", "dop853", rtol=rtol))
         runs[f"d{k}"] = run(error, evaluations=100 * (k + 1))
     for name, step, made in (("fine", 1e-3, run(1e-4, evaluations=50)), ("coarse", 1e-2, REFUSED)):
-        points.append(Point(name, "rk4", step=step))
+        points.append(MeasuredRun(name, "rk4", step=step))
         runs[name] = made
     runs |= changed
     return assemble(points, runs, [POSITION, TIMES]), points, runs
@@ -180,13 +181,14 @@ def test_the_answer_has_the_time_and_the_error_up_to_the_horizon():
 
 
 def test_other_programs_are_drawn_next_to_ours_relative_to_the_same_size(found: xr.Dataset):
-    track = {"name": "peer", "note": "n", "seconds": [1.0, 2.0], "error": {"slider.position": [1e-3, 1e-4]}}
-    (curve,) = work_precision.peers(found, [track])
+    track = {"name": "peer", "seconds": [1.0, 2.0], "error": {"slider.position": [1e-3, 1e-4]}}
+    (curve,) = accuracy.curves_of(found, [track])
     assert curve.error[:, 0] == pytest.approx([1e-3 / SIZE, 1e-4 / SIZE])
     assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
-    mark = work_precision.Mark("this scene", 0.5, {"slider.position": 1e-3})
-    assert set(work_precision.make("w", found, "t", (mark,), [curve])) == {"w.png", "w.svg"}
-    assert cost_study.price_list(found, "t", ("said",)).notes[-1] == "said"
+    own = xr.Dataset({"own_error": found["error"].sel(run="d1")})
+    drawn = work_precision.make("w", found.merge(own, compat="override").assign_attrs(own_seconds=0.5), "t", [curve])
+    assert set(drawn) == {"w.png", "w.svg"}
+    assert drawn["w.svg"].decode().count("<!-- this scene -->") == 2
 
 
 def test_runs_left_undone_are_named_with_their_reason():

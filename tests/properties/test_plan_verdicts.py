@@ -60,7 +60,7 @@ def test_a_stress_that_no_rigid_body_has_is_planned_by_its_size_in_the_flexible_
     scene = edited(scene, stress)
     stressed = Point({"rod.von_mises.series": np.full((3, 1), 5e6), "rod.von_mises.largest": np.array(5e6)}, {}, {}, 1)
     without, unused = (lambda: Point({}, {}, {}, 1)), lambda: pytest.fail("the full scene need not be run")
-    asked = search._requested(
+    asked = search._requested_accuracies(
         scene, scene.requested_quantities(), (without, without, lambda: stressed, unused), watched=True
     )
     assert asked == {"rod.von_mises": pytest.approx(5e4)}

@@ -13,7 +13,7 @@ from flexclear.dynamics.contact.surfaces import profile
 from flexclear.dynamics.contact.surfaces.separation import across, nested
 from flexclear.dynamics.specialise.symbols import Indexed
 from flexclear.dynamics.vectors import Matrix, Vector, cross, dot
-from flexclear.study.wear import arcs, directions
+from flexclear.study.wear import directions, spread_over_arcs
 
 CLEARANCE, RADIUS = 1e-4, 1e-2
 SIZES = SimpleNamespace(clearance=CLEARANCE, radius=RADIUS)
@@ -90,7 +90,7 @@ def test_work_in_one_direction_is_spread_over_the_arc_of_overlap() -> None:
     """A circle pressed into a larger one by d overlaps it where (c + d) cos(angle) > c; the overlap is the weight."""
     depth, fine = 2e-5, np.zeros((1, 360 * 4))
     fine[0, 90 * 4 : 90 * 4 + 2] = 1.0
-    spread = arcs(fine, np.zeros((1, 360)), CLEARANCE, depth)[0]
+    spread = spread_over_arcs(fine, np.zeros((1, 360)), CLEARANCE, depth)[0]
     angle = np.radians(np.arange(360) + 0.5 - 90.25)
     overlap = np.maximum(0.0, (CLEARANCE + depth) * np.cos(angle) - CLEARANCE)
     assert spread.sum() == pytest.approx(2.0, rel=1e-14)

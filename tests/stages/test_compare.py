@@ -84,7 +84,7 @@ def test_what_is_ideal_has_no_twin(tmp_path: Path):
     with pytest.raises(InputError, match="that can be removed"):
         ideal(scene)
     with pytest.raises(InputError, match="a single scene has no other to compare with"):
-        compare.bring([scene], open_workplace())
+        compare.compare_scenes([scene], open_workplace())
 
 
 def test_each_twin_is_made_once(crank: Path, tmp_path: Path):

@@ -54,8 +54,7 @@ def swing() -> Scene:
 @pytest.fixture(scope="module")
 def study(swing: Scene, place: Workplace) -> cost.Study:
     found = cost.Study(swing, place, Budget(60.0))
-    found.first()
-    found.neighbourhood()
+    found.measure_neighbours()
     return found
 
 
@@ -85,7 +84,7 @@ def test_points_are_measured_alone(study: cost.Study):
 
 
 def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.Study, swing: Scene, place: Workplace):
-    found = study.drawn().dataset()
+    found = study.answer().dataset()
     solver = {"solver": {"integrator": "radau", "rtol": 1e-12}}
     converged = scenes.run(edited(swing, solver), place)
     reported = 0
@@ -107,7 +106,7 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
 
 def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, place: Workplace, study: cost.Study):
     small = cost.Study(swing, place, Budget(1e-3))
-    small.first()
+    small.measure_neighbours(most=cost_design.FIRST)
     assert [d.key for d in small.points] == ["as it is", "dop853, rtol 1e-06"]  # one run
     assert len(small.undone) == cost_design.FIRST - 2
     mine, others = small.task().inputs["own"], study.task().inputs["own"]
@@ -115,7 +114,7 @@ def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, 
 
 
 def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Study):
-    found = study.drawn().dataset()
+    found = study.answer().dataset()
     text = sentences(found)
     assert "dop853 at rtol 1e-06" in text
     assert "The integration errs at the outputs" in text
@@ -125,27 +124,15 @@ def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Stud
     assert not np.isnan(found.own_error).any()
 
 
-TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.position": [1e-6, 1e-7]}}
-
-
-def test_peers_change_the_study_but_none_of_its_points(swing: Scene, place: Workplace):
-    studies = [cost.Study(swing, place, Budget(1e-3), peers=peers) for peers in ((), (TRACK,))]
-    for one in studies:
-        one.begin()
-    plain, other = (one.task() for one in studies)
-    assert other.params["peers"] == [TRACK]
-    assert {k: v.params for k, v in other.inputs.items()} == {k: v.params for k, v in plain.inputs.items()}
-
-
 def test_integrators_that_are_named_are_compared_and_unknown_ones_refused(csj: Scene):
-    assert {d.chooses_steps for d in cost_design.wide(csj, ("rk4",))} == {False}
+    assert {d.chooses_steps for d in cost_design.all_methods(csj, ("rk4",))} == {False}
     with pytest.raises(InputError, match="did you mean 'radau'"):
-        cost_design.wide(csj, ("radua",))
+        cost_design.all_methods(csj, ("radua",))
 
 
 def test_points_keep_the_limits_of_the_scene(csj: Scene):
     limited = edited(csj, {"solver": {"rtol": 1e-7, "evaluations": 1234}})
-    designs = [*cost_design.neighbours(limited, OWN), *cost_design.wide(limited)]
+    designs = [*cost_design.neighbours(limited, OWN), *cost_design.all_methods(limited)]
     assert {design.scene.solver.evaluations for design in designs} == {1234}
 
 
@@ -156,8 +143,8 @@ def test_a_method_that_used_up_its_evaluations_is_run_at_no_tighter_tolerance(
     refused.attrs["compile_seconds"] = 1.0
     monkeypatch.setattr(Workplace, "datasets", lambda _, *tasks: [refused] * len(tasks))
     study = cost.Study(swing, place, Budget(1e9), own=1e4, seconds_each=1e-6)
-    first, *tighter = [design for design in cost_design.wide(swing, ("radau",)) if design.chooses_steps]
-    study._queue([first, *tighter])
+    first, *tighter = [design for design in cost_design.all_methods(swing, ("radau",)) if design.chooses_steps]
+    study._measure_affordable([first, *tighter])
     assert [design.key for design in study.points] == [first.key]
     assert study.undone == tighter
 
@@ -166,8 +153,8 @@ def test_the_limit_of_a_trial_run_is_not_called_the_scenes(
     tmp_path: Path, fresh: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ):
     """The run at a tighter tolerance, which determines the error of a compared run, has a limit of its own."""
-    monkeypatch.setattr(members, "FEWEST_EVALUATIONS", 1)
-    monkeypatch.setattr(members, "TIGHTER_EVALUATIONS", 1)
+    monkeypatch.setattr(cost_design, "FEWEST_EVALUATIONS", 1)
+    monkeypatch.setattr(cost_design, "TIGHTER_EVALUATIONS", 1)
     one = write("pendulum", tmp_path)[0]
     other = one.with_name("heavy.toml")
     other.write_text(one.read_text().replace('mass = "1 kg"', 'mass = "2 kg"'))
@@ -177,9 +164,9 @@ def test_the_limit_of_a_trial_run_is_not_called_the_scenes(
 
 def test_what_two_studies_need_is_one_run(swing: Scene, place: Workplace, study: cost.Study):
     """The run at a tenth of the tolerance is a point of the costs and the error of comparisons and effects."""
-    tighter = members.tighter(swing, members.setting_of(swing, place))
+    tighter = members.tighter_run(swing, members.setting_of(swing, place))
     assert tighter is not None
-    tasks = tighter, study.runs["dop853, rtol 1e-07"], members.integrated(swing, study.setting).runs["tight"]
+    tasks = tighter, study.runs["dop853, rtol 1e-07"], members.error_runs(swing, study.setting).runs["tight"]
     assert len({made.record.key for made in place.made(*tasks)}) == 1
     (kept,) = place.datasets(study.runs["as it is"])
     own = scenes.run(swing, place)
@@ -189,9 +176,9 @@ def test_what_two_studies_need_is_one_run(swing: Scene, place: Workplace, study:
 def test_members_that_run_at_a_looser_tolerance_err_as_much_more(csj: Scene):
     """In proportion to their tolerance, which is tighter than necessary in the scene's own run."""
     own = Setting("dop853", 1e-9)
-    assert members.integrated(csj, own).looser == pytest.approx(members.MEANS / 1e-9)
-    assert members.integrated(csj, own, tight=True).looser == 1.0
-    assert members.integrated(csj, Setting("rk4", 1e-10, 1e-5)).looser == 1.0
+    assert members.error_runs(csj, own).looser == pytest.approx(members.MEANS / 1e-9)
+    assert members.error_runs(csj, own, tight=True).looser == 1.0
+    assert members.error_runs(csj, Setting("rk4", 1e-10, 1e-5)).looser == 1.0
 
 
 def test_a_budget_that_is_no_time_is_refused(command: Command):
@@ -224,7 +211,7 @@ def test_the_first_answer_comes_soon_and_its_errors_are_those_of_a_converged_run
     scene, workplace = load_scene(write(kind, tmp_path)[0]), open_workplace()
     workplace = Workplace(workplace.store, workplace.sources, jobs=1)
     begun, first = _spent(), list[float]()
-    study = cost.bring(scene, workplace, answered=lambda made: first.append(_spent() - begun)).dataset()
+    study = cost.measure_costs(scene, workplace, first_answer=lambda made: first.append(_spent() - begun)).dataset()
     print(f"{kind}: first answer after {first[0]:.1f} s of processor time, done after {_spent() - begun:.1f} s")
     assert first[0] <= FIRST
     assert _spent() - begun <= ALL

@@ -12,7 +12,7 @@ import pytest
 import flexclear as fc
 from flexclear.artifacts.effect_size import Influence
 from flexclear.commands.new import write
-from flexclear.dynamics.plan.budget import Chosen, Search
+from flexclear.dynamics.plan.budget import Integration, Search
 from flexclear.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper
 from flexclear.scene import variants
 from flexclear.scene.load import edited, load_scene
@@ -60,7 +60,7 @@ class Priced:
         taken = 1000 if integrator == "dop853" else self.own
         return SimpleNamespace(refused="takes long" if taken > evaluations else "", evaluations=taken)
 
-    def between(self, a: object, b: object) -> dict[str, Influence]:
+    def differences(self, a: object, b: object) -> dict[str, Influence]:
         return {"bob.position": Influence(self.error)}
 
 
@@ -72,7 +72,7 @@ def test_a_plan_takes_the_scenes_own_integrator_where_that_does_as_well(
     evaluations: int, error: float, integrator: str
 ):
     runs: Any = Priced(evaluations, error)
-    known = Chosen("dop853", 1e-6, {"bob.position": 1e-5})
+    known = Integration("dop853", 1e-6, {"bob.position": 1e-5})
     found = cheaper_method(Search(runs, {"bob.position": 1e-2}), known)
     assert found.integrator == integrator
 
@@ -82,13 +82,13 @@ def test_a_plan_that_is_not_cheaper_by_a_fifth_is_the_scene_as_it_is(evaluations
     """The planned run takes 1000 evaluations; that of the scene by its own method as many as given."""
     runs: Any = Priced(evaluations, 0.0)
     runs.variant = lambda dropped: SimpleNamespace(contacts=lambda: {"pin": None}, stops=dict)
-    runs.part, runs.extent = lambda dropped: 0.5, SimpleNamespace(most=10**6)
-    chosen = Chosen("dop853", 1e-6, {"bob.position": 1e-5})
+    runs.affordable_part, runs.extent = lambda dropped: 0.5, SimpleNamespace(most=10**6)
+    chosen = Integration("dop853", 1e-6, {"bob.position": 1e-5})
     assert scene_is_cheaper(Search(runs, {"bob.position": 1e-2}), chosen) is same
 
 
 def test_where_nothing_is_known_of_methods_a_plan_keeps_that_of_the_scene():
-    unknown = Chosen("dop853", 1e-8, {"bob.position": np.nan})
+    unknown = Integration("dop853", 1e-8, {"bob.position": np.nan})
     for own, expected in (("radau", "radau"), ("dop853", "dop853")):
         runs: Any = Priced(400, 1.0, own=own)
         assert cheaper_method(Search(runs, {"bob.position": 1e-2}), unknown).integrator == expected
@@ -173,7 +173,7 @@ def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Pa
         _tight(standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
     )
     with pytest.raises((InputError, SolverError), match="remove all effects") as refused:
-        plan.bring(scene, open_workplace())
+        plan.make_plan(scene, open_workplace())
     assert refused.value.exit_code == 2
     assert not [*(fresh / "plan").rglob("*.toml"), *(fresh / "plan").rglob("*.nc")]
 
@@ -238,7 +238,7 @@ def test_a_scene_that_cannot_be_run_as_it_is_has_no_plan(tmp_path: Path, fresh: 
         },
     )
     with pytest.raises(SolverError, match="cannot be run as it is") as refused:
-        plan.bring(wild, open_workplace())
+        plan.make_plan(wild, open_workplace())
     assert refused.value.exit_code == 3
     assert not [*(fresh / "plan").rglob("*.toml"), *(fresh / "plan").rglob("*.nc")]
 

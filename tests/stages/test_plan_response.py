@@ -13,7 +13,7 @@ from flexclear.dynamics.linear.clearance_response import SQUARED_RANK, opening_m
 from flexclear.dynamics.linear.response import first_excited, vibration
 from flexclear.dynamics.model.constraints import constraints
 from flexclear.dynamics.model.merge import Placement
-from flexclear.dynamics.plan.search import summed
+from flexclear.dynamics.plan.search import sum_by_quantity
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.record.wrenches import joint_wrenches
 from flexclear.scene import variants
@@ -148,7 +148,10 @@ def test_a_jump_of_a_drives_acceleration_is_no_ramp_over_one_output(tmp_path: Pa
 def test_a_quantity_that_no_bound_holds_for_is_not_bounded_by_those_of_others():
     """A pose and a force asked for at once: the bound is of the pose alone."""
     bounds_of_joints = [{"a.position": 1.0}, {"a.position": 2.0}]
-    assert summed(bounds_of_joints, {"a.position": 1.0, "b.force": 1.0}) == {"a.position": 3.0, "b.force": np.inf}
+    assert sum_by_quantity(bounds_of_joints, {"a.position": 1.0, "b.force": 1.0}) == {
+        "a.position": 3.0,
+        "b.force": np.inf,
+    }
 
 
 def test_the_bound_of_a_loose_crank_pin_is_that_of_the_slider_crank(tmp_path: Path):

@@ -139,7 +139,7 @@ def _with_reductions(quantity: Quantity) -> list[Recorded]:
     return [Recorded(quantity, reduction) for reduction in reductions]
 
 
-def _turns(what: Recorded) -> bool:
+def _is_rotation(what: Recorded) -> bool:
     """Return True for a quaternion, which changes by half the angle."""
     return what.quantity.kind == "orientation"
 
@@ -173,7 +173,7 @@ def _distance_of_means(a: Point, b: Point, what: Recorded, members: int) -> tupl
     if np.array_equal(one, two) and np.array_equal(deviations[0], deviations[1]):
         return np.zeros(len(one)), np.zeros(len(one))
     error = _pool_errors(np.hypot(*deviations) / np.sqrt(max(members, 1)))
-    if _turns(what):
+    if _is_rotation(what):
         return rotation_between(*(q / np.linalg.norm(q, axis=1, keepdims=True) for q in (one, two))), error
     return np.linalg.norm(one - two, axis=1), error
 
@@ -250,7 +250,9 @@ def predictable_difference(
         return Influence(np.nan, np.nan)
     if quantity.kind == "impact_times" or what.name not in a.values or what.name not in b.values:
         return _impact_times(a, b, quantity.name) if quantity.kind == "impact_times" else Influence(np.inf)
-    distance, spread = _distance_of_means(_begin(a, what.name, outputs), _begin(b, what.name, outputs), what, members)
+    distance, spread = _distance_of_means(
+        _first_outputs(a, what.name, outputs), _first_outputs(b, what.name, outputs), what, members
+    )
     uncertainty = chance(members) * spread + error
     sure = distance >= REAL * uncertainty
     if not (sure & (distance > max(rounding(a, quantity), rounding(b, quantity)))).any():
@@ -260,7 +262,7 @@ def predictable_difference(
     return Influence(float(distance[at]), float(uncertainty[at]))
 
 
-def _begin(point: Point, name: str, outputs: int | None) -> Point:
+def _first_outputs(point: Point, name: str, outputs: int | None) -> Point:
     """Return the first outputs of one series of a point."""
     values, deviation = (
         {name: rows[name][:outputs]} if name in rows else {} for rows in (point.values, point.deviation)
@@ -295,7 +297,7 @@ def _error_of_pairs(a: Point, b: Point, what: Recorded) -> np.ndarray:
     """Return the standard error of the mean difference of two ways to run a scene, by pairs of equal starts."""
     pairs = zip(a.members, b.members, strict=True)
     spread = np.std([_as_rows(one[what.name]) - _as_rows(two[what.name]) for one, two in pairs], axis=0, ddof=1)
-    return _pool_errors(np.linalg.norm(spread, axis=1) * (2.0 if _turns(what) else 1.0)) / np.sqrt(len(b.members))
+    return _pool_errors(np.linalg.norm(spread, axis=1) * (2.0 if _is_rotation(what) else 1.0)) / np.sqrt(len(b.members))
 
 
 def _allowed_error(full: Point, what: Recorded, requested: float) -> np.ndarray:
@@ -307,7 +309,7 @@ def _allowed_error(full: Point, what: Recorded, requested: float) -> np.ndarray:
 def _deviations(point: Point, what: Recorded) -> np.ndarray:
     """Return the standard deviation of one member at each output."""
     rows = _as_rows(point.deviation.get(what.name, np.zeros(len(_as_rows(point.values[what.name])))))
-    return np.linalg.norm(rows, axis=1) * (2.0 if _turns(what) else 1.0)
+    return np.linalg.norm(rows, axis=1) * (2.0 if _is_rotation(what) else 1.0)
 
 
 def agreement(planned: Point, full: Point, quantity: Quantity, members: int, requested: float) -> Agreement:

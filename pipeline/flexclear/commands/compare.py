@@ -8,7 +8,7 @@ from flexclear.scene.variants import EFFECTS
 from flexclear.stages.export import as_json
 from flexclear.stages.scenes import graphs, print_files, scene_arguments
 from flexclear.stages.workplace import open_workplace
-from flexclear.study.compare import IDEAL, TABLES, bring
+from flexclear.study.compare import IDEAL, TABLES, compare_scenes
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Bring the comparison up to date, print its tables and where its files are."""
     workplace = open_workplace(options)
-    made = bring([graph.scene for graph in graphs(options.scenes, options.set)], workplace, options.ideal)
+    made = compare_scenes([graph.scene for graph in graphs(options.scenes, options.set)], workplace, options.ideal)
     if options.json:
         print(as_json(made.dataset()))
         return

@@ -7,7 +7,7 @@ import argparse
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
 from flexclear.stages.workplace import Made, open_workplace, relative, seconds
-from flexclear.study.cost import BUDGET, TABLE, bring
+from flexclear.study.cost import BUDGET, TABLE, measure_costs
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,7 +29,7 @@ def command(options: argparse.Namespace) -> None:
             print(made.text(TABLE), text, sep="\n", flush=True)
 
     for graph in scenes.graphs(options.scenes, options.set):
-        made = bring(graph.scene, workplace, integrators=options.integrators, budget=budget, answered=first)
+        made = measure_costs(graph.scene, workplace, integrators=options.integrators, budget=budget, first_answer=first)
         studies[graph.scene.name] = made.dataset()
         if not options.json:
             print(made.text(TABLE), f"figures and data: {made.folder}\n", sep="\n")

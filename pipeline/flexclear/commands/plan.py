@@ -8,7 +8,7 @@ from pathlib import Path
 from flexclear.artifacts.store import publish
 from flexclear.stages import export, scenes
 from flexclear.stages.workplace import open_workplace, seconds
-from flexclear.study.plan import BUDGET, LEVEL, bring, verify
+from flexclear.study.plan import BUDGET, LEVEL, make_plan, verify
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +33,7 @@ def command(options: argparse.Namespace) -> None:
     missed, plans = list[str](), dict[str, object]()
     budget = seconds(options.budget, "--budget")
     for graph in scenes.graphs(options.scenes, options.set):
-        planned = bring(graph.scene, workplace, options.accuracy)
+        planned = make_plan(graph.scene, workplace, options.accuracy)
         plans[graph.scene.name] = planned.made.dataset() if options.json else None
         if not options.json:
             print(planned.made.text("plan.md"))

@@ -8,14 +8,8 @@ from pathlib import Path
 
 from flexclear.stages.export import as_json
 from flexclear.stages.scenes import graphs
-from flexclear.stages.workplace import (
-    Workplace,
-    add_options,
-    open_workplace,
-    relative,
-    seconds,
-)
-from flexclear.study.report import of_scene
+from flexclear.stages.workplace import Workplace, add_options, open_workplace, relative, seconds
+from flexclear.study.report import write_report
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,4 +44,4 @@ def _pages(options: argparse.Namespace, workplace: Workplace) -> Iterator[tuple[
     budget = None if options.budget is None else seconds(options.budget, "--budget")
     answers = options.answers != "none"
     for graph in graphs(options.scenes, options.set):
-        yield graph.scene.name, of_scene(graph, workplace, folder=options.folder, budget=budget, answers=answers)
+        yield graph.scene.name, write_report(graph, workplace, folder=options.folder, budget=budget, answers=answers)

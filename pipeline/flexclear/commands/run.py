@@ -51,7 +51,7 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--verify", "reports the true error of a plan, but no plan is requested", "add --planned")
     requested = graphs(options.scenes, options.set)
     workplace = open_workplace(options)
-    plans = [plan.bring(graph.scene, workplace) for graph in requested] if options.planned else []
+    plans = [plan.make_plan(graph.scene, workplace) for graph in requested] if options.planned else []
     print(*(f"{one.made.text('plan.md')}\n" for one in plans), sep="", end="")
     requested = [Graph(one.planned) for one in plans] or requested
     for graph in requested:

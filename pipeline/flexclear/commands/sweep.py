@@ -14,7 +14,7 @@ from flexclear.stages.export import as_json
 from flexclear.stages.sweeps import sweep_large, sweep_plan
 from flexclear.stages.sweeps.sweep_engine import engine
 from flexclear.stages.workplace import add_options, open_workplace
-from flexclear.study.sweep import NAME, bring, read, summary, width
+from flexclear.study.sweep import NAME, read, run_sweep, summary, width
 from flexclear.system.errors import InputError, SolverError
 
 
@@ -45,7 +45,7 @@ def command(options: argparse.Namespace) -> None:
     with engine(width(options.jobs), options.scheduler) as workers, workplace.time_limit():
         for path, plan in zip(paths, requested, strict=True):
             name = scenes.with_edits(scene_name(path).removeprefix("sweeps/"), options.set)
-            made[name] = bring(plan, workers, workplace, folder := workplace.store.root / "sweeps" / name)
+            made[name] = run_sweep(plan, workers, workplace, folder := workplace.store.root / "sweeps" / name)
             _show(plan, made[name], folder, options.out, quiet=options.json)
     if options.json:
         print(as_json(made))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexclear.stages import scenes
 from flexclear.stages.export import as_json
 from flexclear.stages.workplace import open_workplace, relative
-from flexclear.study.wear import TOLERANCE, bring
+from flexclear.study.wear import TOLERANCE, wear_surfaces
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +40,9 @@ def command(options: argparse.Namespace) -> None:
     """Bring the wear of each scene up to date, and print it."""
     workplace, worn = open_workplace(options), {}
     for graph in scenes.graphs(options.scenes, options.set):
-        made = bring(graph.scene, workplace, options.cycles, per_run=options.per_run, tolerance=options.tolerance)
+        made = wear_surfaces(
+            graph.scene, workplace, options.cycles, per_run=options.per_run, tolerance=options.tolerance
+        )
         data = worn[graph.scene.name] = made.dataset()
         if not options.json:
             print(text(graph.scene.name, data), f"figure and data: {relative(made.folder)}\n", sep="\n")

@@ -168,8 +168,7 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
 
     Raises InputError when the scene has none of them.
     """
-    kinds = {*effects_gone, *([BACKLASH] if CLEARANCE in effects_gone else [])}
-    gone = [effect for effect in effects(scene) if effect.kind in kinds]
+    gone = idealised_effects(scene, effects_gone)
     if not gone:
         raise InputError(
             str(scene.path or scene.name),
@@ -179,6 +178,12 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
     result = without(scene, gone)
     result._name = scene.name
     return result
+
+
+def idealised_effects(scene: Scene, kinds: Collection[str] = tuple(EFFECTS)) -> list[Effect]:
+    """Return the effects of these kinds, of EFFECTS, that the ideal mechanism lacks; with clearance goes backlash."""
+    every = {*kinds, *([BACKLASH] if CLEARANCE in kinds else [])}
+    return [effect for effect in effects(scene) if effect.kind in every]
 
 
 def contacts_that_stay(types: Mapping[str, str]) -> list[str]:

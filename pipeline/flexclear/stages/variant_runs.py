@@ -35,10 +35,10 @@ def plain(scene: Scene) -> Scene:
     return edited(scene, dict.fromkeys(UNSEEN)) if any(getattr(scene, key) for key in UNSEEN) else scene
 
 
-def tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list[Task]:
+def member_tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list[Task]:
     """Return the tasks of a variant, one per batch of members; `effect_size.point_of_members` reads their artifacts."""
     variant = plain(scene)
-    count, bodies = _members(variant, members), Graph(variant, shown=False).bodies()
+    count, bodies = _count_members(variant, members), Graph(variant, shown=False).bodies()
     ends = [*(end for end in BATCHES if end < count), count]
     written = [q.written() for q in chosen]
     return [
@@ -47,7 +47,7 @@ def tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list[Task]:
     ]
 
 
-def measured(scene: Scene, key: str, names: Sequence[str], run: Task | None = None) -> Task:
+def measuring_task(scene: Scene, key: str, names: Sequence[str], run: Task | None = None) -> Task:
     """Return the task that measures the run of a scene alone, and keeps these quantities.
 
     key: the name of the run.  run: the task of the scene's own run, where this is the same one.
@@ -72,7 +72,7 @@ def _task(
     )
 
 
-def _members(scene: Scene, members: int) -> int:
+def _count_members(scene: Scene, members: int) -> int:
     """Return the number of members: 0 for a scene without contacts and stops, whose motion needs no ensemble."""
     return members if scene.contacts() or scene.stops() else 0
 
@@ -154,4 +154,6 @@ def watch(
     from flexclear.artifacts.effect_size import compared_values
     from flexclear.dynamics.record.point import Runner
 
-    return Runner(bundles, compared_values(scene.owners(), chosen), _members(scene, members), first=first).run(scene)
+    return Runner(bundles, compared_values(scene.owners(), chosen), _count_members(scene, members), first=first).run(
+        scene
+    )

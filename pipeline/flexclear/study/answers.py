@@ -18,9 +18,8 @@ from flexclear.stages import scenes
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
 from flexclear.study import cost, effects
-from flexclear.study.members import MEMBERS, Budget
+from flexclear.study.members import MEMBERS, Budget, comparing_task
 from flexclear.system.errors import SolverError
-from flexclear.workflow.task import Task
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,9 +76,9 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, of: Sequence
     place, given = open_workplace(), None if budget is None else seconds(budget, "budget")
     workplace = replace(place, jobs=1)  # in this process: a worker would run a caller's script again from its top
     if name == "effects" and given is None:
-        answer = effects.examine(scene, place, of=of, pairs=True)
+        answer = effects.examine_effects(scene, place, of=of, pairs=True)
     elif name == "cost":
-        name, answer = "accuracy", cost.bring(scene, workplace, budget=given or cost.BUDGET)
+        name, answer = "accuracy", cost.measure_costs(scene, workplace, budget=given or cost.BUDGET)
     else:
         answer = answer_of(name, scene, workplace, given, of)
     words = shown_answer(name, answer, scene)
@@ -112,7 +111,7 @@ class Answers:
     of: Sequence[str] = ()
 
     @cached_property
-    def _started(self) -> cost.Study:
+    def _study_of_own_run(self) -> cost.Study:
         """Return the study with the scene's own run measured, and with the budget that follows from that run."""
         study = cost.Study(self.scene, self.workplace, Budget(self.seconds or LEAST))
         study.begin()
@@ -122,15 +121,14 @@ class Answers:
     @cached_property
     def _study(self) -> cost.Study:
         """Return the study with the points in the neighbourhood of the scene's own setting."""
-        study, part = self._started, ALONE if self.seconds is None else 1.0
+        study, part = self._study_of_own_run, ALONE if self.seconds is None else 1.0
         part = ACCURACY if self.questions > 1 else part
-        study.first(part)
-        study.neighbourhood(part)
+        study.measure_neighbours(part)
         return study
 
     @cached_property
     def accuracy(self) -> Made:
-        """Return what accuracy costs (`stages.cost_study`); raise SolverError where no run succeeds."""
+        """Return what accuracy costs (`stages.studies`); raise SolverError where no run succeeds."""
         return self.workplace.made(self._study.task())[0]
 
     @cached_property
@@ -141,22 +139,14 @@ class Answers:
         except SolverError:
             study = {}
         graph = Graph(self.scene, shown=False)
-        members = {"post": graph.post} if graph.ensemble else {}
-        task = Task(
-            stage="stability",
-            scene=self.scene.name,
-            run="flexclear.stages.evaluation:stability",
-            params={"by_need": self.scene.by_need()},
-            inputs={"run": graph.simulate, **study, **members},
-            code=("flexclear.post",),
-            folder=f"stability/{self.scene.name.replace('/', '_')}",
-            names={"nc": "stability.nc"},
-        )
+        inputs = {"run": graph.simulate, **study, **({"post": graph.post} if graph.ensemble else {})}
+        params = {"by_need": self.scene.by_need()}
+        task = comparing_task("stability", self.scene.name, params, inputs, "evaluation:stability")
         return self.workplace.made(task)[0]
 
     @cached_property
     def effects(self) -> Made:
-        """Return which effects matter (`effects.examine`); raise InputError for a scene without effects or watches."""
-        study, levels = self._started, MEMBERS[:1] if self.seconds is None else MEMBERS
+        """Return which effects matter (`effects.examine_effects`), which raises InputError."""
+        study, levels = self._study_of_own_run, MEMBERS[:1] if self.seconds is None else MEMBERS
         own = study.setting, study.own * study.seconds_each
-        return effects.examine(self.scene, self.workplace, levels, self.of, own=own, budget=study.budget)
+        return effects.examine_effects(self.scene, self.workplace, levels, self.of, own=own, budget=study.budget)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexclear.artifacts.store import publish
 from flexclear.post.pages import Part, page
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import EFFECTS, ideal, replaceable_contacts
+from flexclear.scene.variants import EFFECTS, ideal, idealised_effects
 from flexclear.stages.graph import Graph
 from flexclear.stages.scenes import joint_folder_name, pictures, tables
 from flexclear.stages.workplace import Made, Workplace, check, open_workplace
@@ -26,7 +26,7 @@ PICTURES = {"compare.png": ("Watched quantities, and their distance from the ref
 TABLES = ("differences.md", "costs.md")
 
 
-def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None) -> Made:
+def compare_scenes(scenes: list[Scene], workplace: Workplace, without: str | None = None) -> Made:
     """Run scenes, their ideal mechanisms, and all of these at tighter tolerances; return the comparison and its page.
 
     without: one of IDEAL, or None for the scenes alone.  Raises InputError.
@@ -46,7 +46,7 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
     chosen = [q for side in sides for q in side.watched_quantities()]
     tight = dict[str, Task]()
     for label, graph in graphs.items():
-        task = members.tighter(graph.scene, members.setting_of(graph.scene, workplace), chosen)
+        task = members.tighter_run(graph.scene, members.setting_of(graph.scene, workplace), chosen)
         if task is not None:
             tight[label] = task
     outcome = workplace.bring(list(tight.values()))
@@ -62,10 +62,10 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
 
 
 def dataset(scenes: list[Scene], without: str | None = None) -> xr.Dataset:
-    """Return the comparison that `bring` makes, as a dataset that shows it in a notebook."""
+    """Return the comparison that `compare_scenes` makes, as a dataset that shows it in a notebook."""
     from flexclear.post.answers.answered import with_answer
 
-    made = bring(scenes, open_workplace(), without)
+    made = compare_scenes(scenes, open_workplace(), without)
     data, picture = made.dataset(), next(iter(PICTURES))
     names = ", ".join(map(str, data["run"].values))
     drawn = made.read(picture) if picture in made.record.files else None
@@ -77,8 +77,7 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
     sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
     ideals: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
-        present = [e for e in effects if (replaceable_contacts(scene) if e == "clearance" else scene.flexible())]
-        if present or not ideals:
+        if idealised_effects(scene, effects) or not ideals:
             made = ideal(scene, effects)
             same = any(made.model_dump() == other.model_dump() for other in ideals)
             made._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
@@ -99,13 +98,5 @@ def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
     labels = list(graphs)
     inputs = {f"run{k}": graphs[label].simulate for k, label in enumerate(labels)}
     inputs |= {f"tight{k}": tight[label] for k, label in enumerate(labels) if label in tight}
-    return Task(
-        stage="comparison",
-        scene=labels[-1],
-        run="flexclear.stages.evaluation:comparison",
-        params={"labels": labels, "quantities": list(quantities.values())},
-        inputs=inputs,
-        code=("flexclear.post",),
-        folder=f"compare/{joint_folder_name(labels)}",
-        names={"nc": "compare.nc"},
-    )
+    params, folder = {"labels": labels, "quantities": list(quantities.values())}, joint_folder_name(labels)
+    return members.comparing_task("compare", labels[-1], params, inputs, "evaluation:comparison", folder)

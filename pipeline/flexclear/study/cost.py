@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flexclear.dynamics.analyses import require_without_events
 from flexclear.scene.load import edited
@@ -22,11 +22,8 @@ from flexclear.workflow.task import Task
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
 
-#: runs of another program: name, note, seconds [s] and errors [SI] by quantity, as of `work_precision.peers`
-Track = dict[str, Any]
 #: budget of a study [s of processor time]; time of a new set of kernels [s]
 BUDGET, COMPILING = 80.0, 8.0
 #: limit of a point's evaluations: so many times those of the scene's own run, or this fraction of the budget if more
@@ -41,7 +38,7 @@ TABLE, FIGURE = "price.md", "work_precision"
 class Study:
     """A cost study while its points are computed, each from the cache where it exists.
 
-    compiled: identities of compiled kernels.
+    runs: tasks of the points by key.  undone: points that were skipped.  compiled: identities of compiled kernels.
     evaluations: those of runs, by integrator and tolerance; at least so many where they were used up.  own,
     seconds_each: evaluations of the scene's own run, and the time of each.
     """
@@ -50,7 +47,6 @@ class Study:
     workplace: Workplace
     budget: Budget
     integrators: Collection[str] = ()
-    peers: Sequence[Track] = ()
     compiled: set[tuple[str, ...]] = field(default_factory=set)
     runs: dict[str, Task] = field(default_factory=dict)
     points: list[cost_design.Design] = field(default_factory=list)
@@ -60,6 +56,15 @@ class Study:
     seconds_each: float = 0.0
     _complete: bool = False
 
+    @cached_property
+    def setting(self) -> cost_design.Setting:
+        """Integrator, tolerance and step of the scene's own run."""
+        return members.setting_of(self.scene, self.workplace)
+
+    @cached_property
+    def _neighbours(self) -> list[cost_design.Design]:
+        return cost_design.neighbours(self.scene, self.setting)
+
     def begin(self) -> None:
         """Run the scene as it is, which predicts the time of other runs.
 
@@ -68,96 +73,67 @@ class Study:
         if self.points:
             return
         require_without_events(self.scene, "the cost of a run")
-        record = self._made(self._neighbours[0])
+        asis, *others = self._neighbours
+        record = self._measure(asis)
         if "refused" in record.attrs:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
-        same = self._neighbours[0]
-        for design in self._neighbours[1:]:
-            if design.scene.solver == same.scene.solver:
-                self.runs[design.key] = self.runs[same.key]  # one run, which is two points
-                self.points.append(design)
+        same = [design for design in others if design.scene.solver == asis.scene.solver]
+        self.points += same  # one run, which is two points
+        self.runs |= dict.fromkeys((design.key for design in same), self.runs[asis.key])
         self.own = float(record.attrs["evaluations"])
         self.seconds_each = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
 
-    def first(self, part: float = 1.0) -> None:
-        """Compute the first few points in the neighbourhood of the scene's own setting, within a part of the budget."""
+    def measure_neighbours(self, part: float = 1.0, most: int | None = None) -> None:
+        """Compute the first points, by default all, in the neighbourhood of the scene's own setting, within a part of
+        the budget."""
         self.begin()
-        self._queue(self._neighbours[1 : cost_design.FIRST], part)
+        self._measure_affordable(self._neighbours[1:most], part)
 
-    def neighbourhood(self, part: float = 1.0) -> None:
-        """Compute the other points in the neighbourhood of the scene's own setting, within a part of the budget."""
-        self._queue(self._neighbours[cost_design.FIRST :], part)
-
-    def beyond(self) -> None:
+    def measure_others(self) -> None:
         """Compute the points farther away, the cheapest first, as far as the budget goes."""
-        known = {design.key for design in (*self.points, *self.undone)}
-        more = [one for one in cost_design.wide(self.scene, self.integrators) if one.key not in known]
-        self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
+        more = cost_design.all_methods(self.scene, self.integrators)
+        self._measure_affordable(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
         self._complete = True
-
-    @property
-    def _chosen(self) -> list[Quantity]:
-        """Quantities of the scene's `[accuracy]`, else those that it watches."""
-        return self.scene.requested_quantities() if self.scene.accuracy is not None else self.scene.watched_quantities()
-
-    @cached_property
-    def _neighbours(self) -> list[cost_design.Design]:
-        return cost_design.neighbours(self.scene, self.setting)
-
-    @cached_property
-    def setting(self) -> cost_design.Setting:
-        """Integrator, tolerance and step of the scene's own run."""
-        return members.setting_of(self.scene, self.workplace)
 
     def task(self) -> Task:
         """Return the task of the study of all points so far."""
         own, *others = self.points
+        chosen = self.scene.requested_quantities() if self.scene.accuracy is not None else None
+        params = {
+            "points": [{"key": d.key, **d.setting} for d in others],
+            "quantities": [q.written() for q in chosen or self.scene.watched_quantities()],
+            "title": self.scene.title,
+            "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
+            "complete": self._complete and not self.undone,
+            "undone": _list_names([d.key for d in self.undone]),
+        }
         inputs = {"own": self.runs[own.key]} | {f"point{k}": self.runs[d.key] for k, d in enumerate(others)}
-        return Task(
-            stage="cost",
-            scene=self.scene.name,
-            run="flexclear.stages.cost_study:run",
-            params={
-                "points": [{"key": d.key, **d.setting} for d in others],
-                "quantities": [q.written() for q in self._chosen],
-                "title": self.scene.title,
-                "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
-                "complete": self._complete and not self.undone,
-                "undone": _listed([d.key for d in self.undone]),
-                "peers": list(self.peers),
-            },
-            inputs=inputs,
-            code=("flexclear.post",),
-            folder=f"cost/{self.scene.name}",
-            names={"nc": "cost.nc"},
-        )
+        return members.comparing_task("cost", self.scene.name, params, inputs)
 
-    def drawn(self) -> Made:
+    def answer(self) -> Made:
         """Return the study of the points so far, with its table and figure."""
         return self.workplace.made(self.task())[0]
 
-    def _queue(self, designs: Sequence[cost_design.Design], part: float = 1.0) -> None:
-        """Compute points in this order; skip those that a part of the budget or the limit of a point does not allow."""
-        for design in (one for one in designs if one.key not in self.runs):
+    def _measure_affordable(self, designs: Sequence[cost_design.Design], part: float = 1.0) -> None:
+        """Compute new points in this order; skip those that a part of the budget or the limit of a point does not
+        allow."""
+        known = {*self.runs, *(design.key for design in self.undone)}
+        for design in (one for one in designs if one.key not in known):
             evaluations = design.evaluations(self.evaluations, self.own)
             compiling = COMPILING if kernels.kernel_identity(design.scene) not in self.compiled else 0.0
             allowed = self.budget.allows(evaluations * self.seconds_each + POINT + compiling, part)
             if not allowed or (design.chooses_steps and evaluations > self._evaluation_limit()):
                 self.undone.append(design)
             else:
-                self._made(design)
+                self._measure(design)
 
-    def _made(self, design: cost_design.Design) -> xr.Dataset:
+    def _measure(self, design: cost_design.Design) -> xr.Dataset:
         """Return one point, brought up to date."""
-        run, tight = None if self.own else Graph(self.scene, shown=False).simulate, None
-        if self.points and design.key == self._neighbours[1].key:
-            tight = members.tighter_design(self.scene, self.setting)
-        if tight is not None:
-            design = tight  # the same run as that of a comparison
-        elif self.own:
+        run = None if self.own else Graph(self.scene, shown=False).simulate
+        if self.own and (not self.points or design is not self._neighbours[1]):  # that one has a limit of its own
             limit = min(self.scene.solver.evaluations, self._evaluation_limit())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
-        task = variant_runs.measured(design.scene, design.key, members.names_of(self.scene), run)
+        task = variant_runs.measuring_task(design.scene, design.key, members.kept_names(self.scene), run)
         (record,) = self.workplace.datasets(task)
         self.compiled.add(kernels.kernel_identity(design.scene))
         self.runs[design.key] = task
@@ -182,35 +158,33 @@ class Study:
         return next(factor * below for factor in (1, 2, 5, 10) if factor * below >= affordable)
 
 
-def bring(
+def measure_costs(
     scene: Scene,
     workplace: Workplace,
-    peers: Sequence[Track] = (),
     integrators: Collection[str] = (),
     *,
     budget: float = BUDGET,
-    answered: Callable[[Made], None] = lambda made: None,
+    first_answer: Callable[[Made], None] = lambda made: None,
 ) -> Made:
     """Return the study of a scene with its table and figure, brought up to date as far as the budget [s] goes.
 
-    peers: runs of other programs.  integrators: see `cost_design.wide`.  answered: called with
-    the first answer. Raises InputError for a scene without quantities to measure.  Interrupted work leaves the answer
-    so far.
+    integrators: see `cost_design.all_methods`.  first_answer: called with it. Raises InputError for a scene without
+    quantities to measure.  Interrupted work leaves the answer so far.
     """
-    study = Study(scene, workplace, Budget(budget), integrators, peers)
-    study.first()
-    answered(study.drawn())
+    study = Study(scene, workplace, Budget(budget), integrators)
+    study.measure_neighbours(most=cost_design.FIRST)
+    first_answer(study.answer())
     try:
-        study.neighbourhood()
-        study.beyond()
+        study.measure_neighbours()
+        study.measure_others()
     except (KeyboardInterrupt, FlexclearError):
         with suppress(FlexclearError):
-            study.drawn()
+            study.answer()
         raise
-    return study.drawn()
+    return study.answer()
 
 
-def _listed(keys: Sequence[str]) -> str:
+def _list_names(keys: Sequence[str]) -> str:
     """Return the first keys as text, and the number of the others."""
     more = f" and {len(keys) - LISTED_RUNS} more" if len(keys) > LISTED_RUNS else ""
     return "; ".join(keys[:LISTED_RUNS]) + more

@@ -28,6 +28,9 @@ FIRST = 4
 TIGHTEST, LOOSEST = 1e-14, 1e-2
 #: keys of the scene that no point of a study has
 PLAIN: Mapping[str, None] = {"accuracy": None, "ensemble": None}
+#: evaluations allowed to the first neighbour, the tighter run from which the error of the scene's own run follows: a
+#: multiple of those of that run, and at least the second number
+TIGHTER_EVALUATIONS, FEWEST_EVALUATIONS = 4, 100_000
 #: predicted evaluations of a method without a known run, in multiples of those of the scene's own run
 UNSEEN = 3.0
 
@@ -57,7 +60,7 @@ class Design:
 
     @property
     def setting(self) -> dict[str, Any]:
-        """Integrator, and tolerance or fixed step [s], as of `post.cost.study.Point`."""
+        """Integrator, and tolerance or fixed step [s], as of `post.cost.study.MeasuredRun`."""
         solver = self.scene.solver
         chosen = {"rtol": solver.rtol} if self.chooses_steps else {"step": solver.step}
         return {"integrator": solver.integrator, **chosen}
@@ -87,7 +90,7 @@ def neighbours(scene: Scene, own: Setting) -> list[Design]:
     """Return the scene as it is and its neighbours, the most informative first: runs by its own method, since another
     one must be compiled. Only fixed steps, which are no reference, need the other method early."""
     fixed = {} if own.step is None else {"step": own.step, "events": scene.solver.events}
-    asis = Design("as it is", _edited(scene, integrator=own.integrator, rtol=own.rtol, **fixed))
+    asis = Design("as it is", _with_solver(scene, integrator=own.integrator, rtol=own.rtol, **fixed))
     if own.step is not None:
         mine = [_design(scene, own.integrator, step=own.step * factor) for factor in STEPS]
         confirming: tuple[float, ...] = CONFIRMING_STEPS
@@ -95,6 +98,9 @@ def neighbours(scene: Scene, own: Setting) -> list[Design]:
         tolerances = dict.fromkeys(min(max(own.rtol * factor, TIGHTEST), LOOSEST) for factor in TOLERANCES)
         mine = [_design(scene, own.integrator, rtol=rtol) for rtol in tolerances]
         confirming = tuple(dict.fromkeys(max(own.rtol * factor, TIGHTEST) for factor in CONFIRMING))
+    if own.step is not None or mine[0].scene.solver.rtol < own.rtol:
+        most = min(max(TIGHTER_EVALUATIONS * own.evaluations, FEWEST_EVALUATIONS), scene.solver.evaluations)
+        mine[0] = Design(mine[0].key, edited(mine[0].scene, {"solver.evaluations": most}))
     others = [_design(scene, other, rtol=rtol) for rtol in confirming for other in _others(scene, own)]
     early = 2 if own.step is not None else 4
     return [asis, *mine[:early], *others[:1], *mine[early:4], *others[1:], *mine[4:]]
@@ -106,7 +112,7 @@ def _others(scene: Scene, own: Setting) -> list[str]:
     return [name for name in (DEFAULT, implicit) if name != own.integrator]
 
 
-def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
+def all_methods(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
     """Return all methods over all their tolerances and steps.
 
     integrators: methods to compare, all when empty.  Raises InputError for a method that is never compared.
@@ -126,10 +132,10 @@ def _design(scene: Scene, integrator: str, **setting: float) -> Design:
     """Return the run by a method at a tolerance `rtol` or with a fixed `step` [s]."""
     ((name, value),) = setting.items()
     key = f"{integrator}, {name} {value:g}{' s' if name == 'step' else ''}"
-    return Design(key, _edited(scene, integrator=integrator, **setting))
+    return Design(key, _with_solver(scene, integrator=integrator, **setting))
 
 
-def _edited(scene: Scene, **solver: Any) -> Scene:
+def _with_solver(scene: Scene, **solver: Any) -> Scene:
     """Return the scene with another method and with its own limits."""
     own = scene.solver.model_dump(mode="json", exclude_none=True, exclude={*NAMING, "events", "by_need"})
     return edited(scene, {"solver": own | solver, **PLAIN})

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 from flexclear.scene import variants
 from flexclear.scene.variants import EFFECTS, Effect
-from flexclear.stages import effect_study
 from flexclear.stages.workplace import Made, Workplace
 from flexclear.study.cost_design import Setting
-from flexclear.study.members import MEMBERS, Budget, Members, integrated, setting_of, with_setting
+from flexclear.study.members import MEMBERS, Budget, Members, comparing_task, error_runs, setting_of, with_setting
 from flexclear.system.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,10 +21,10 @@ if TYPE_CHECKING:
     from flexclear.scene.quantity import Quantity
     from flexclear.scene.schema import Scene
 
-Names = effect_study.Names
+Names = frozenset[str]
 
 
-def examine(
+def examine_effects(
     scene: Scene,
     workplace: Workplace,
     levels: Sequence[int] = MEMBERS[:1],
@@ -35,7 +34,7 @@ def examine(
     own: tuple[Setting, float] | None = None,
     budget: Budget | None = None,
 ) -> Made:
-    """Run the scene without each effect; return effect sizes and which effects matter (`stages.effect_study`).
+    """Run the scene without each effect; return effect sizes and which effects matter (`stages.studies`).
 
     levels: numbers of members that are tried until a change beyond the horizon is decided.  of: names of effects or
     parts, as of `variants.effects_of`.  pairs: also add each effect to the bare scene, and remove and add pairs. own:
@@ -48,8 +47,8 @@ def examine(
     if min(levels) < 2:
         text = f"must be at least 2 (got {min(levels)})"
         raise InputError("--members", text, "the scatter cannot be estimated from one start")
-    effects, chosen = _examined(scene, of)
-    removed, (setting, seconds) = _removed(scene, effects, IDEAL), own or (setting_of(scene, workplace), 0.0)
+    effects, chosen = _effects_and_quantities(scene, of)
+    removed, (setting, seconds) = removals(scene, effects, IDEAL), own or (setting_of(scene, workplace), 0.0)
     levels = levels if scene.contacts() or scene.stops() else (0,)
     full, tight = frozenset[str](), False
     while True:
@@ -61,33 +60,39 @@ def examine(
             return [gone for gone, pair in compared.items() if undecided_quantities(pair, chosen)]
 
         reached = runs.until_decided(made, levels, more)
-        ran = {gone: made[gone] for gone in (full, *reached)}
-        if pairs:
-            ran |= {gone: _without(scene, effects, gone, setting, tight=tight) for gone in combined(effects)}
-            runs.points(ran, levels[-1])
         if tight or not runs.refused:
             break
         tight = True  # members run at the scene's own tolerance, since the looser one for means was refused
+    ran = {gone: made[gone] for gone in (full, *reached)}
+    if pairs:
+        ran |= {gone: _without(scene, effects, gone, setting, tight=tight) for gone in combined(effects)}
+        runs.points(ran, levels[-1])
     members = {name: reached[gone] for name, gone in removed.items() if gone in reached}
     words = {effect.name: effect.words for effect in effects} | {IDEAL: IDEAL}
     if removed.get(IDEAL) in [gone for name, gone in removed.items() if name != IDEAL]:
         words[IDEAL] = ""  # is listed as that effect
-    task = effect_study.task(
-        scene,
-        chosen,
-        ran,
-        runs.tasks,
-        integrated(scene, setting, tight=tight),
-        removed={name: sorted(removed[name]) for name in members},
-        members=members,
-        words=words,
-        undone=", ".join(words[name] for name in removed if name not in members and words[name]),
-        added=[[e.name, e.kind, e.within, e.joint] for e in effects] if pairs else [],
-    )
+    errors, types = error_runs(scene, setting, tight=tight), {name: joint.type for name, joint in scene.joint.items()}
+    params = {
+        "title": scene.title,
+        "looser": errors.looser,
+        "quantities": [q.written() for q in chosen],
+        "units": [q.unit for q in chosen],
+        "outputs": [scene.time.start, scene.output.interval],
+        "variants": [sorted(names) for names in ran],
+        "owners": [{kind: list(names) for kind, names in one.owners().items()} for one in ran.values()],
+        "staying": [name for name in variants.contacts_that_stay(types) if f"joint.{name}" not in full.union(*ran)],
+        "removed": {name: sorted(removed[name]) for name in members},
+        "members": members,
+        "words": words,
+        "undone": ", ".join(words[name] for name in removed if name not in members and words[name]),
+        "added": [[e.name, e.kind, e.within, e.joint] for e in effects] if pairs else [],
+    }
+    inputs = {f"variant{k}/{n}": one for k, gone in enumerate(ran) for n, one in enumerate(runs.tasks[gone])}
+    task = comparing_task("effects", scene.name, params, {**inputs, **errors.runs})
     return workplace.made(task)[0]
 
 
-def _examined(scene: Scene, of: Sequence[str]) -> tuple[tuple[Effect, ...], list[Quantity]]:
+def _effects_and_quantities(scene: Scene, of: Sequence[str]) -> tuple[tuple[Effect, ...], list[Quantity]]:
     """Return the effects that can be removed and the watched quantities; InputError without one of them."""
     effects, chosen, where = (
         variants.effects_of(scene, of, f"{scene.name} --of"),
@@ -105,9 +110,9 @@ def _examined(scene: Scene, of: Sequence[str]) -> tuple[tuple[Effect, ...], list
     return effects, chosen
 
 
-def _removed(scene: Scene, effects: Sequence[Effect], ideal: str) -> dict[str, Names]:
+def removals(scene: Scene, effects: Sequence[Effect], ideal: str) -> dict[str, Names]:
     """Return the effects that go with each one: first, as `ideal`, all clearances and flexible bodies."""
-    idealised = frozenset(e.name for e in variants.effects(scene) if e.kind in EFFECTS)
+    idealised = frozenset(effect.name for effect in variants.idealised_effects(scene))
     both = {ideal: idealised} if idealised and idealised <= {e.name for e in effects} else {}
     order = sorted(effects, key=lambda effect: effect.kind not in EFFECTS)
     alone = both | {effect.name: frozenset({effect.name}) for effect in order}

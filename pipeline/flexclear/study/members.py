@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeVar
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexclear.scene.integrators import DEFAULT, VIBRATING
 from flexclear.scene.load import edited
 from flexclear.scene.solver import of_run
 from flexclear.stages import variant_runs
-from flexclear.stages.effect_study import Integrated
 from flexclear.stages.graph import Graph
-from flexclear.study.cost_design import Design, Setting, neighbours
+from flexclear.study.cost_design import Setting, neighbours
 from flexclear.workflow.task import Task
 
 if TYPE_CHECKING:
@@ -30,14 +29,24 @@ if TYPE_CHECKING:
 #: name of a variant
 Name = TypeVar("Name", bound=Hashable)
 #: numbers of members that are tried until a comparison is decided
-MEMBERS = (4, 8, 16, 32, 64)
+MEMBERS = variant_runs.BATCHES
 #: processor time of a run besides its integration [s]
 POINT = 0.6
 #: tightest tolerance of members with contacts: their starts differ by a thousandth of the clearance, which is more than
 #: this tolerance of the mechanism's size
 MEANS = 1e-6
-#: evaluations allowed to a tighter run: a multiple of those of the scene's own run, and at least the second number
-TIGHTER_EVALUATIONS, FEWEST_EVALUATIONS = 4, 100_000
+
+
+@dataclass(frozen=True)
+class ErrorRuns:
+    """Runs whose distance is the error of the time integration of members.
+
+    runs: ``own``, the scene's, and ``tight``, at a tighter tolerance (`variant_runs.measure`); empty without one.
+    looser: the members' tolerance as a multiple of the scene's, to which their errors are proportional.
+    """
+
+    runs: Mapping[str, Task]
+    looser: float = 1.0
 
 
 @dataclass
@@ -107,7 +116,7 @@ class Members:
         """Return the points of variants over this number of members; of one run where a variant has no contacts."""
         from flexclear.artifacts.effect_size import point_of_members
 
-        tasks = {name: variant_runs.tasks(scene, self.chosen, members) for name, scene in variants.items()}
+        tasks = {name: variant_runs.member_tasks(scene, self.chosen, members) for name, scene in variants.items()}
         made = iter(self.workplace.made(*(task for few in tasks.values() for task in few)))
         points = {}
         for name, few in tasks.items():
@@ -123,6 +132,26 @@ class Members:
         return points
 
 
+def comparing_task(
+    stage: str, scene: str, params: Mapping[str, Any], inputs: Mapping[str, Task], run: str = "", folder: str = ""
+) -> Task:
+    """Return a task that compares the runs of a study, and shows ``<stage>.nc`` with its table and figure.
+
+    scene: its name.  run: function of `flexclear.stages`, by default that of the stage's name in `stages.studies`.
+    folder: name below that of the stage, by default the scene's.
+    """
+    return Task(
+        stage=stage,
+        scene=scene,
+        run=f"flexclear.stages.{run or f'studies:{stage}'}",
+        params=params,
+        inputs=inputs,
+        code=("flexclear.post",),
+        folder=f"{stage}/{folder or scene}",
+        names={"nc": f"{stage}.nc"},
+    )
+
+
 def setting_of(scene: Scene, workplace: Workplace) -> Setting:
     """Return integrator, tolerance, step and evaluations of the scene's own run."""
     (run,) = workplace.datasets(Graph(scene, shown=False).simulate)
@@ -130,38 +159,29 @@ def setting_of(scene: Scene, workplace: Workplace) -> Setting:
     return Setting(*own, scene.solver.step, int(run.attrs["evaluations"]))
 
 
-def names_of(scene: Scene, others: Iterable[Quantity] = ()) -> list[str]:
+def kept_names(scene: Scene, others: Iterable[Quantity] = ()) -> list[str]:
     """Return the quantities that the points of a scene keep: requested, watched, and `others` that it has."""
     owners = scene.owners()
     asked = scene.requested_quantities() if scene.accuracy is not None else []
     return list(dict.fromkeys(q.name for q in (*asked, *scene.watched_quantities(), *others) if q.is_there(owners)))
 
 
-def tighter_design(scene: Scene, own: Setting) -> Design | None:
-    """Return the scene at a tenth of its run's tolerance or half its step; None where no tolerance is tighter.
-
-    It takes at most a multiple of the run's evaluations.
-    """
+def tighter_run(scene: Scene, own: Setting, others: Iterable[Quantity] = ()) -> Task | None:
+    """Return the run at a tenth of the tolerance of the scene's run, or half its step: its distance from the scene's
+    run is the run's error. None where no tolerance is tighter."""
     design = neighbours(scene, own)[1]
     if own.step is None and design.scene.solver.rtol >= own.rtol:
         return None
-    most = min(max(TIGHTER_EVALUATIONS * own.evaluations, FEWEST_EVALUATIONS), scene.solver.evaluations)
-    return replace(design, scene=edited(design.scene, {"solver.evaluations": most}))
+    return variant_runs.measuring_task(design.scene, design.key, kept_names(scene, others))
 
 
-def tighter(scene: Scene, own: Setting, others: Iterable[Quantity] = ()) -> Task | None:
-    """Return the point of `tighter_design`: its distance from the scene's run is the run's error."""
-    design = tighter_design(scene, own)
-    return None if design is None else variant_runs.measured(design.scene, design.key, names_of(scene, others))
-
-
-def integrated(scene: Scene, own: Setting, *, tight: bool = False) -> Integrated:
+def error_runs(scene: Scene, own: Setting, *, tight: bool = False) -> ErrorRuns:
     """Return the runs from which the error of members' integration follows; tight: as of `with_setting`."""
-    task = tighter(scene, own)
+    task = tighter_run(scene, own)
     if task is None:
-        return Integrated({})
+        return ErrorRuns({})
     rtol = with_setting(scene, own, tight=tight).solver.rtol
-    return Integrated(
+    return ErrorRuns(
         {"own": Graph(scene, shown=False).simulate, "tight": task}, rtol / own.rtol if own.step is None else 1.0
     )
 

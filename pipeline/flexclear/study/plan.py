@@ -63,14 +63,14 @@ class Result(NamedTuple):
 def dataset(scene: Scene, level: str | None, budget: str | float | None) -> Result:
     """Return the planned scene, and the plan as a dataset that shows its answer in a notebook.
 
-    level: as of `bring`.  budget: time for `errors_of`
+    level: as of `make_plan`.  budget: time for `errors_of`
     [s], or text; None leaves the errors out.
     """
     from flexclear.post.answers.answered import with_answer
     from flexclear.post.answers.plan import verification_table, words
 
     workplace = open_workplace()
-    planned = bring(scene, workplace, level)
+    planned = make_plan(scene, workplace, level)
     result, table = planned.made.dataset(), scenes.tables(planned.made, "plan.md")
     if budget is not None:
         compared = errors_of(planned, workplace, seconds(budget, "budget"))
@@ -108,7 +108,7 @@ class Planned:
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
 
 
-def bring(scene: Scene, workplace: Workplace, level: str | None = None) -> Planned:
+def make_plan(scene: Scene, workplace: Workplace, level: str | None = None) -> Planned:
     """Bring the plan of a scene up to date, and write the planned scene's file.
 
     level: accuracy of all watched quantities that change, in place of the scene's `[accuracy]`, as in `with_accuracy`;
@@ -124,13 +124,13 @@ def bring(scene: Scene, workplace: Workplace, level: str | None = None) -> Plann
             where, "has no effect that could be omitted: no clearance, flexible body, friction, gravity or stop"
         )
     (made,) = workplace.made(effect_plan.task(scene, watched=level is not None))
-    planned = Planned(scene, of(scene, made.dataset()), made)
+    planned = Planned(scene, planned_scene(scene, made.dataset()), made)
     if scene.path is not None:
         publish(planned.target, planned.file(planned.target))
     return planned
 
 
-def of(scene: Scene, plan: xr.Dataset) -> Scene:
+def planned_scene(scene: Scene, plan: xr.Dataset) -> Scene:
     """Apply a plan to a scene: replace and remove parts, set solver and watched quantities."""
     decided = json.loads(plan.attrs["planned"])
     bare = variants.without(scene, variants.effects_by_name(scene, decided["gone"], f"{scene.name} [plan]"))

@@ -14,16 +14,11 @@ from flexclear.artifacts.disk import publish
 from flexclear.post.pages import Part, downloads, figures_of, in_folder, page, prose
 from flexclear.scene.output import rows
 from flexclear.scene.provenance import assumed_values
-from flexclear.scene.variants import replaceable_contacts
+from flexclear.scene.variants import idealised_effects
 from flexclear.stages import derived_series
 from flexclear.stages.notebook import COST
 from flexclear.stages.scenes import errors_in_file, pictures
-from flexclear.stages.workplace import (
-    Made,
-    Workplace,
-    check,
-    relative,
-)
+from flexclear.stages.workplace import Made, Workplace, check, relative
 from flexclear.study import compare
 from flexclear.study.answers import Answers, shown_answer
 from flexclear.system.errors import FlexclearError, ResourceError
@@ -58,7 +53,7 @@ PROVENANCE = {
 }
 
 
-def of_scene(
+def write_report(
     graph: Graph, workplace: Workplace, *, folder: bool = False, budget: float | None = None, answers: bool = True
 ) -> Path:
     """Bring everything in the report of a scene up to date; return the page.
@@ -70,9 +65,9 @@ def of_scene(
     """
     scene = graph.scene
     compared, answering = None, Answers(scene, workplace, budget, questions=2 if answers else 0)
-    if replaceable_contacts(scene) or scene.flexible():
+    if idealised_effects(scene):
         with errors_in_file(scene.path):
-            compared = compare.bring([scene], workplace, "both")
+            compared = compare.compare_scenes([scene], workplace, "both")
     drawn = [task for what, task in graph.render.items() if what in SHOWN_MOTION]
     members = [graph.ensemble, graph.post] if graph.ensemble else []
     outcome = workplace.bring([*drawn, graph.overview, *members])  # the film takes longest, so it begins first

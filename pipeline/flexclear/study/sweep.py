@@ -62,7 +62,7 @@ def of_scene(
     """Return the dataset of a sweep from a table with the keys of a sweep file except its scene; see `fc.sweep`."""
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)
     with engine(width(workers), scheduler) as runner:
-        return bring(plan, runner, open_workplace())
+        return run_sweep(plan, runner, open_workplace())
 
 
 @dataclass
@@ -107,7 +107,7 @@ class _Sink:
         self.waiting = []
 
 
-def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: Path | None = None) -> xr.Dataset:
+def run_sweep(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: Path | None = None) -> xr.Dataset:
     """Return the dataset of a sweep, brought up to date point by point.
 
     folder: where dataset and figures are shown; Ctrl-C leaves the finished points there. A dataset that memory does not

@@ -26,6 +26,7 @@ from flexclear.post.single_run.series import BANDS, SURFACES, spread_over_surfac
 from flexclear.scene.load import edited
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Made, Workplace
+from flexclear.study.members import comparing_task
 from flexclear.system.errors import FlexclearError, InputError
 from flexclear.workflow.task import Task
 
@@ -69,27 +70,29 @@ class Study:
         """Return the joints that wear."""
         return self.scene.wearing_joints()
 
-    def go_on(self, cycles: float) -> None:
+    def wear_until(self, cycles: float) -> None:
         """Wear the surfaces until so many cycles are done."""
         step = 0.0
         if not self.steps:
-            self.steps.append(self._evaluated(0.0, {name: start(joint, name) for name, joint in self.joints.items()}))
+            self.steps.append(
+                self._run_worn(0.0, {name: initial_depths(joint, name) for name, joint in self.joints.items()})
+            )
         while self.steps[-1].cycles < cycles:
             now = self.steps[-1]
             left, deep = cycles - now.cycles, self._fraction(now.rates)
             if not step:
                 step = self.tolerance / deep if deep else left
             step = min(max(min(step, DEEPEST / deep if deep else left), self.per_run), left)
-            depths = self._extrapolated(step)
+            depths = self._extrapolate(step)
             reached = cycles if step == left else now.cycles + step
-            after = self._evaluated(reached, depths)
+            after = self._run_worn(reached, depths)
             mean = {name: 0.5 * step * (now.rates[name] + after.rates[name]) for name in depths}
             error = self._fraction({name: mean[name] - depths[name] + now.depths[name] for name in depths})
             if error <= self.tolerance or step <= self.per_run:
                 self.steps.append(after._replace(error=error))
             step *= min(max(SAFE * (self.tolerance / error) ** 0.5 if error else MOST, LEAST), MOST)
 
-    def _extrapolated(self, step: float) -> dict[str, np.ndarray]:
+    def _extrapolate(self, step: float) -> dict[str, np.ndarray]:
         """Return the depths after a step of cycles, which are nowhere less than before."""
         now, before = self.steps[-1], self.steps[-2] if len(self.steps) > 1 else None
         depths = dict[str, np.ndarray]()
@@ -105,7 +108,7 @@ class Study:
         """Return the largest of depths, as fraction of the joint's clearance."""
         return max(float(np.abs(depths[name]).max()) / joint.clearance for name, joint in self.joints.items())
 
-    def _evaluated(self, cycles: float, depths: dict[str, np.ndarray]) -> Wearing:
+    def _run_worn(self, cycles: float, depths: dict[str, np.ndarray]) -> Wearing:
         """Return the state with these depths, whose run is brought up to date."""
         edits = {**worn_edits(self.joints, depths), "output.horizon": False}
         graph = Graph(edited(self.scene, edits), shown=False)
@@ -126,19 +129,12 @@ class Study:
             | {key: {n: d.tolist() for n, d in getattr(one, key).items()} for key in ("depths", "rates")}
             for one in self.steps
         ]
-        return Task(
-            stage="wear",
-            scene=self.scene.name,
-            run="flexclear.stages.wear_study:run",
-            params={"joints": joints, "steps": steps, "title": self.scene.title},
-            inputs={f"post{k}": one.run for k, one in enumerate(self.steps)},
-            code=("flexclear.post",),
-            folder=f"wear/{self.scene.name}",
-            names={"nc": "wear.nc"},
-        )
+        params = {"joints": joints, "steps": steps, "title": self.scene.title}
+        inputs = {f"post{k}": one.run for k, one in enumerate(self.steps)}
+        return comparing_task("wear", self.scene.name, params, inputs)
 
 
-def bring(
+def wear_surfaces(
     scene: Scene,
     workplace: Workplace,
     cycles: float,
@@ -159,7 +155,7 @@ def bring(
         raise InputError(scene.name, text, "give a clearance-revolute or clearance-spherical joint a wear = { ... }")
     study = Study(scene, workplace, per_run, tolerance)
     try:
-        study.go_on(cycles)
+        study.wear_until(cycles)
     except (KeyboardInterrupt, FlexclearError):
         if study.steps:
             with suppress(FlexclearError):
@@ -173,7 +169,7 @@ def is_ball(joint: Any) -> bool:
     return "ball_radius" in type(joint).model_fields
 
 
-def start(joint: Any, name: str) -> np.ndarray:
+def initial_depths(joint: Any, name: str) -> np.ndarray:
     """Return the depths of a joint at the start of a study [m]: those of its profile, else none."""
     shapes = joint.wear.shapes.get(name)
     if shapes is not None:
@@ -206,12 +202,12 @@ def depths_of_run(run: LabelledArrays, k: int, joint: Any, depths: np.ndarray) -
         fine = FINE * sectors, FINE * bands if bands > 1 else 1
         work = spread_over_surface(run[f"wear_direction_{side}"].values[:, k], path[:, None], *fine)[..., 0]
         area = surface_area(joint.model_dump(), side) / (sectors * bands)
-        spread = arcs(work, depths[j], joint.clearance, penetration)
+        spread = spread_over_arcs(work, depths[j], joint.clearance, penetration)
         added[j] = shares[j] * per_path * spread / area
     return added
 
 
-def arcs(work: np.ndarray, depths: np.ndarray, clearance: float, penetration: float) -> np.ndarray:
+def spread_over_arcs(work: np.ndarray, depths: np.ndarray, clearance: float, penetration: float) -> np.ndarray:
     """Return work by band and sector [N m], of work in finer directions, spread over where the surfaces overlap.
 
     depths: by band and sector of one surface [m].  penetration: typical one [m].  The surfaces overlap by

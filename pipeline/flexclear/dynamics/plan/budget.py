@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flexclear.artifacts.effect_size import Influence
+from flexclear.artifacts.points import Point
 from flexclear.dynamics.linear.clearance_response import OF_POSE
 from flexclear.dynamics.plan.screening_runs import ScreeningRuns
 from flexclear.scene.plan_decisions import PILOT, Decision
@@ -24,7 +25,7 @@ WHOLE = 1.0
 
 
 @dataclass(frozen=True)
-class Chosen:
+class Integration:
     """Integration of the planned scene. level: of modes, None: all.  error: by quantity [SI], NaN where unknown.
 
     ledger_tolerance: energy error beyond which the run is refused, where it differs from the default.
@@ -41,7 +42,7 @@ class Chosen:
 
 
 #: the planned run equals that of the scene: integrator and tolerance stay
-UNCHANGED = Chosen("", 0.0, {})
+UNCHANGED = Integration("", 0.0, {})
 
 
 @dataclass
@@ -64,6 +65,20 @@ class Search:
             self.used.get(name, 0.0) + upper.get(name, np.inf) / self.requested[name] <= budget
             for name in self.requested
         )
+
+    def compare(
+        self, changed: Point, reference: Point, *, flexible: bool = False, fraction: float = 1.0
+    ) -> tuple[dict[str, Influence], dict[str, float]]:
+        """Return effect sizes, with the uncertainties of screening runs and over all of the time, and upper bounds.
+
+        flexible: bodies of the scene are flexible, those of both points may be rigid.  fraction: of the time of both.
+        """
+        poses, sizes = {q.name for q in self.runs.chosen if q.kind in OF_POSE}, dict[str, Influence]()
+        for name, i in self.runs.differences(changed, reference).items():
+            of_impacts = OF_IMPACTS if flexible and name not in poses else 0.0
+            part = possible_increase(fraction) + OF_SCREENING + of_impacts
+            sizes[name] = Influence(i.difference, i.uncertainty + part * i.difference)
+        return sizes, upper_bounds(sizes)
 
     def spend(self, upper: Mapping[str, float]) -> None:
         """Subtract effect sizes from the budget."""
@@ -91,7 +106,7 @@ class Search:
         """
         difference = {name: influence.difference for name, influence in sizes.items()}
         uncertainty = {name: influence.uncertainty for name, influence in sizes.items()}
-        reason = why or besides + too_much(upper, self.requested)
+        reason = why or besides + reason_to_keep(upper, self.requested)
         self.decide(effect, not why, PILOT, reason, difference, uncertainty)
 
 
@@ -100,17 +115,12 @@ def upper_bounds(sizes: Mapping[str, Influence]) -> dict[str, float]:
     return {name: influence.most for name, influence in sizes.items()}
 
 
-def widened(search: Search, sizes: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:
-    """Return effect sizes with uncertainties: of screening runs, of flexible bodies' impacts, a fraction `more`."""
-    kinds = {q.name: q.kind for q in search.runs.chosen}
-    result = {}
-    for name, i in sizes.items():
-        fraction = more + OF_SCREENING + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
-        result[name] = Influence(i.difference, i.uncertainty + fraction * i.difference)
-    return result
+def possible_increase(fraction: float) -> float:
+    """Return by how much an effect size of runs over a fraction of the time may grow over all of it, as a fraction."""
+    return 0.0 if fraction == 1.0 else WHOLE
 
 
-def too_much(upper: Mapping[str, float], requested: Mapping[str, float]) -> str:
+def reason_to_keep(upper: Mapping[str, float], requested: Mapping[str, float]) -> str:
     """Return the reason why an effect stays: its largest possible change, in words."""
     name = max(requested, key=lambda n: upper[n] / requested[n])
     if not np.isfinite(upper[name]):

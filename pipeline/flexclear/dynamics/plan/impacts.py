@@ -13,8 +13,8 @@ import numpy as np
 
 from flexclear.artifacts.effect_size import Influence
 from flexclear.artifacts.points import Point
-from flexclear.dynamics.plan.budget import BUDGET, UNCHANGED, WHOLE, Chosen, Search, upper_bounds, widened
-from flexclear.dynamics.plan.screening_runs import MEMBERS, OF_TIGHT, longest
+from flexclear.dynamics.plan.budget import BUDGET, UNCHANGED, Integration, Search, possible_increase
+from flexclear.dynamics.plan.screening_runs import MEMBERS, OF_TIGHT, longest_affordable
 from flexclear.dynamics.plan.tolerance import TIGHTEST
 from flexclear.dynamics.run.ledger import CHOSEN
 from flexclear.scene.integrators import DEFAULT
@@ -40,11 +40,9 @@ MOST_WORK = 3e8
 def decide_bending(search: Search, soft: Sequence[Effect]) -> None:
     """Decide between flexible and rigid bodies in a mechanism that keeps its clearance."""
     runs, dropped = search.runs, search.dropped
-    for fraction in sorted({runs.part(dropped), runs.whole(dropped)}):
+    for fraction in sorted({runs.affordable_part(dropped), runs.examined_part(dropped)}):
         full = runs.must_run(dropped, fraction)
-        sizes = runs.between(runs.point([*dropped, *soft], fraction=fraction), full)
-        sizes = widened(search, sizes, False, _more(fraction))
-        upper = upper_bounds(sizes)
+        sizes, upper = search.compare(runs.point([*dropped, *soft], fraction=fraction), full, fraction=fraction)
         if not search.fits(upper):
             break
     small = search.fits(upper)
@@ -54,7 +52,7 @@ def decide_bending(search: Search, soft: Sequence[Effect]) -> None:
         search.judge(effect, "bending does not change the clearance response" if small else "", upper, sizes)
 
 
-def cheapest(search: Search) -> Chosen:
+def choose_with_contacts(search: Search) -> Integration:
     """Return the cheapest verified integration of a scene with contacts; default: the screening runs' method, tighter.
 
     All candidates are compared with that method at a tighter tolerance (TIGHTER), over the whole time if affordable:
@@ -62,42 +60,44 @@ def cheapest(search: Search) -> Chosen:
     lose a few per cent of the energy where stability bounds the steps.
     """
     runs, dropped = search.runs, search.dropped
-    loose = runs.loose(runs.variant(dropped))
+    loose = runs.loose_tolerance(runs.variant(dropped))
     tight, limit = max(TIGHTER * loose, TIGHTEST), OF_TIGHT * runs.extent.most
-    unknown = Chosen(DEFAULT, tight, dict.fromkeys(search.requested, np.nan))
-    fraction, reference = longest(
-        runs.whole(dropped), lambda part: runs.point(dropped, fraction=part, rtol=tight, evaluations=limit)
+    unknown = Integration(DEFAULT, tight, dict.fromkeys(search.requested, np.nan))
+    fraction, reference = longest_affordable(
+        runs.examined_part(dropped), lambda part: runs.point(dropped, fraction=part, rtol=tight, evaluations=limit)
     )
     if reference.refused:
         return unknown
-    levels = _levels(search)
+    levels = _levels_to_test(search)
     for rtol in (QUICK_RTOL, loose):
         for level in [*levels, None]:
             if runs.work > MOST_WORK:
                 return unknown
-            tried = _tried(search, level, fraction, rtol, reference)
-            errors, fits = _errors(search, tried, reference, fraction)
+            tried = _run_candidate(search, level, fraction, rtol, reference)
+            errors, fits = _integration_errors(search, tried, reference, fraction)
             if fits:
                 search.spend(errors)
                 taken = [point.evaluations / (MEMBERS * fraction) for point in (tried, reference)]
-                return Chosen(QUICK, rtol, errors, level, LEDGER, *taken)
-            if level is not None and _by_modes(search, errors, runs.between(tried, reference)):
+                return Integration(QUICK, rtol, errors, level, LEDGER, *taken)
+            if level is not None and _is_due_to_modes(search, errors, runs.differences(tried, reference)):
                 levels = [k for k in levels if k != level]
     near = all(errors[name] <= NEAR * BUDGET * requested for name, requested in search.requested.items())
     return unknown if near else UNCHANGED
 
 
-def _errors(search: Search, tried: Point, reference: Point, fraction: float) -> tuple[dict[str, float], bool]:
+def _integration_errors(
+    search: Search, tried: Point, reference: Point, fraction: float
+) -> tuple[dict[str, float], bool]:
     """Return the error of an integration over the whole time, by quantity, and True when it fits into the budget.
 
     The observed difference with its uncertainty must fit, and so must the difference extrapolated to the whole time.
     """
-    differences = search.runs.same_starts(tried, reference, search.requested)
-    errors = {name: (1.0 + _more(fraction)) * i.difference for name, i in differences.items()}
+    differences = search.runs.paired_differences(tried, reference, search.requested)
+    errors = {name: (1.0 + possible_increase(fraction)) * i.difference for name, i in differences.items()}
     return errors, search.fits({name: max(errors[name], i.most) for name, i in differences.items()})
 
 
-def _by_modes(search: Search, errors: Mapping[str, float], sizes: Mapping[str, Influence]) -> bool:
+def _is_due_to_modes(search: Search, errors: Mapping[str, float], sizes: Mapping[str, Influence]) -> bool:
     """Return True when modes rather than tolerance cause a difference: it is large, or members diverge anyway."""
     return any(
         NEAR * BUDGET * requested < errors[name] < np.inf or sizes[name].uncertainty > requested
@@ -105,23 +105,18 @@ def _by_modes(search: Search, errors: Mapping[str, float], sizes: Mapping[str, I
     )
 
 
-def _more(fraction: float) -> float:
-    """Return the possible increase over the rest of the time, as a fraction."""
-    return 0.0 if fraction == 1.0 else WHOLE
-
-
-def _levels(search: Search) -> list[int]:
+def _levels_to_test(search: Search) -> list[int]:
     """Return the levels of fewer modes that may be tested."""
     runs = search.runs
     bending = runs.variant(search.dropped).flexible()
-    return [k for k in range(len(runs.fewer)) if runs.modes(k, bending) and runs.saved(k) >= 1.0 / WORTH]
+    return [k for k in range(len(runs.fewer)) if runs.modes(k, bending) and runs.saved_work(k) >= 1.0 / WORTH]
 
 
-def _tried(search: Search, level: int | None, fraction: float, rtol: float, rival: Point) -> Point:
+def _run_candidate(search: Search, level: int | None, fraction: float, rtol: float, rival: Point) -> Point:
     """Run a level of modes at a tolerance; the run stops where it takes longer than another run of all modes, or loses
     energy too fast."""
     runs = search.runs
-    saved = 1.0 if level is None else runs.saved(level)
+    saved = 1.0 if level is None else runs.saved_work(level)
     limits: dict[str, Any] = {
         "evaluations": int(saved * rival.evaluations / MEMBERS) + 1,
         "ledger_tolerance": OF_LEDGER * CHOSEN * fraction,

@@ -48,7 +48,7 @@ OF_TIGHT = 2
 Key = tuple[frozenset[str], str]
 
 
-def longest(fraction: float, run: Callable[[float], Point]) -> tuple[float, Point]:
+def longest_affordable(fraction: float, run: Callable[[float], Point]) -> tuple[float, Point]:
     """Return the largest part of the time, from a fraction down, whose run is not too long, and that run."""
     while TAKES_LONG in (point := run(fraction)).refused and fraction > LEAST_PART:
         fraction = max(LEAST_PART, SHORTER * fraction)
@@ -74,7 +74,7 @@ class ScreeningRuns:
 
     bundles: reduced flexible bodies.  fewer: those with fewer modes, where available, levels with the fewest
     first.  filled: fills in rigid bodies that recipes describe.  points: results by variant.  evaluations: of all runs.
-    work: evaluations times variables, summed.  refused_loose: True when the loose tolerance was refused.
+    work: evaluations times variables, sum_by_quantity.  refused_loose: True when the loose tolerance was refused.
     """
 
     scene: Scene
@@ -91,34 +91,34 @@ class ScreeningRuns:
     _engines: dict[tuple[frozenset[str], int | None, str], Engine | None] = field(default_factory=dict)
 
     @cached_property
-    def every(self) -> tuple[Effect, ...]:
+    def all_effects(self) -> tuple[Effect, ...]:
         """All effects of the scene."""
         return effects(self.scene)
 
     def _names(self, dropped: Collection[Effect]) -> frozenset[str]:
         """Return the names of effects, and of the effects within them, which are dropped with them."""
         names = {effect.name for effect in dropped}
-        return frozenset(names | {effect.name for effect in self.every if effect.within in names})
+        return frozenset(names | {effect.name for effect in self.all_effects if effect.within in names})
 
     def variant(self, dropped: Collection[Effect]) -> Scene:
         """Return the scene without some effects and those within them, with the integration of screening runs."""
         names = self._names(dropped)
         if (names, self.refused_loose) not in self._variants:
-            bare = without(self.scene, [effect for effect in self.every if effect.name in names])
-            self._variants[names, self.refused_loose] = self._made(bare)
+            bare = without(self.scene, [effect for effect in self.all_effects if effect.name in names])
+            self._variants[names, self.refused_loose] = self._with_solver(bare)
         return self._variants[names, self.refused_loose]
 
-    def _made(self, bare: Scene) -> Scene:
+    def _with_solver(self, bare: Scene) -> Scene:
         contacts = bool(bare.contacts() or bare.stops())
         smooth = bool(bare.flexible()) and not contacts
         usual: dict[str, object] = (
             {"integrator": SMOOTH, "rtol": SMOOTH_RTOL} if smooth else {"integrator": DEFAULT, "rtol": RTOL}
         )
         if contacts:
-            usual = {"integrator": DEFAULT, "rtol": self.loose(bare), "evaluations": self.extent.most}
+            usual = {"integrator": DEFAULT, "rtol": self.loose_tolerance(bare), "evaluations": self.extent.most}
         return self.filled(edited(bare, {"solver": usual}))
 
-    def loose(self, variant: Scene) -> float:
+    def loose_tolerance(self, variant: Scene) -> float:
         """Return the tolerance of a variant with contacts."""
         clearances = [joint.clearance for joint in variant.contacts().values()]
         if self.refused_loose:
@@ -133,7 +133,7 @@ class ScreeningRuns:
         model = tabulate(build(placed(self.scene), self.bundles))
         return Extent(model.mechanism.length, model.nq + model.nv)
 
-    def part(self, dropped: Collection[Effect]) -> float:
+    def affordable_part(self, dropped: Collection[Effect]) -> float:
         """Return the part of the time over which a variant is compared with others, so that it does not take too long.
 
         A run of the beginning from one start predicts that part; it shrinks where the part still takes too long.
@@ -141,11 +141,11 @@ class ScreeningRuns:
         beginning = self.must_run(dropped, BEGINNING, 0)
         fraction = BEGINNING * ALLOWED / (MEMBERS * max(beginning.evaluations, 1) * self.extent.variables)
         fraction = LEAST_PART if beginning.refused else float(np.clip(fraction, LEAST_PART, 1.0))
-        return longest(fraction, lambda part: self.must_run(dropped, part))[0]
+        return longest_affordable(fraction, lambda part: self.must_run(dropped, part))[0]
 
-    def whole(self, dropped: Collection[Effect]) -> float:
+    def examined_part(self, dropped: Collection[Effect]) -> float:
         """Return the part of the time over which a variant with clearance is examined: all of it where affordable."""
-        return min(1.0, WHOLE_TIME * self.part(dropped))
+        return min(1.0, WHOLE_TIME * self.affordable_part(dropped))
 
     def point(
         self,
@@ -184,7 +184,7 @@ class ScreeningRuns:
         """Return the numbers of modes of a level, for those bodies that have a choice."""
         return {name: int(bundle.sizes["mode"]) for name, bundle in self.fewer[level].items() if name in bodies}
 
-    def saved(self, level: int) -> float:
+    def saved_work(self, level: int) -> float:
         """Return the ratio of the full scene's number of variables to that with this level of modes."""
         return self.extent.variables / self._variables({**self.bundles, **self.fewer[level]})
 
@@ -206,13 +206,13 @@ class ScreeningRuns:
             raise SolverError(f"{self.scene.name}: the scene cannot be run as it is: {point.refused}")
         return point
 
-    def between(self, a: Point, b: Point) -> dict[str, Influence]:
+    def differences(self, a: Point, b: Point) -> dict[str, Influence]:
         """Return the difference of two points in each quantity; infinite where one of them was refused."""
         if a.refused or b.refused:
             return {q.name: Influence(np.inf) for q in self.chosen}
         return {q.name: influence(a, b, q, MEMBERS) for q in self.chosen}
 
-    def same_starts(self, a: Point, b: Point, requested: Mapping[str, float]) -> dict[str, Influence]:
+    def paired_differences(self, a: Point, b: Point, requested: Mapping[str, float]) -> dict[str, Influence]:
         """Return the difference of two integrations of a variant, in each quantity; infinite if one was refused."""
         if a.refused or b.refused:
             return dict.fromkeys(requested, Influence(np.inf))

@@ -20,10 +20,10 @@ from flexclear.artifacts.labelled import Labelled
 from flexclear.artifacts.points import Point
 from flexclear.dynamics.linear.clearance_response import OF_POSE, bounds
 from flexclear.dynamics.linear.response import Response, response
-from flexclear.dynamics.plan.budget import BUDGET, UNCHANGED, WHOLE, Chosen, Search, upper_bounds, widened
-from flexclear.dynamics.plan.impacts import cheapest, decide_bending
+from flexclear.dynamics.plan.budget import BUDGET, UNCHANGED, Integration, Search, possible_increase, upper_bounds
+from flexclear.dynamics.plan.impacts import choose_with_contacts, decide_bending
 from flexclear.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, ScreeningRuns
-from flexclear.dynamics.plan.tolerance import cheaper_method, scene_is_cheaper, smooth
+from flexclear.dynamics.plan.tolerance import cheaper_method, choose_without_contacts, scene_is_cheaper
 from flexclear.dynamics.run.run import Run, integrate
 from flexclear.scene.load import edited
 from flexclear.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Plan
@@ -72,22 +72,22 @@ def plan(
     runs = ScreeningRuns(bare, own, less, filled, quantities, progress)
     _ = runs.extent  # refuses a scene that cannot be built, before anything is run
     runs.must_run((), BEGINNING, 0)
-    loose, soft = ([effect for effect in runs.every if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
+    loose, soft = ([effect for effect in runs.all_effects if effect.kind == kind] for kind in (CLEARANCE, FLEXIBILITY))
     ideal = runs.point([*loose, *soft], rtol=RTOL)
     simpler = (lambda: ideal, lambda: runs.point(soft), lambda: runs.point(loose), lambda: runs.point(()))
-    search = Search(runs, _requested(scene, quantities, simpler, watched))
+    search = Search(runs, _requested_accuracies(scene, quantities, simpler, watched))
     runs.chosen = [q for q in quantities if q.name in search.requested]
-    rigid = _rigid(search, [*loose, *soft]) if loose or soft else None
-    _clearances(search, loose, soft, rigid)
-    _interactions(search, soft)
-    _flexibilities(search, soft, loose, rigid)
-    _confirm(search, soft)
-    _others(search)
+    rigid = _run_ideal(search, [*loose, *soft]) if loose or soft else None
+    _decide_clearances(search, loose, soft, rigid)
+    _decide_interactions(search, soft)
+    _decide_flexibility(search, soft, loose, rigid)
+    _confirm_clearances(search, soft)
+    _decide_others(search)
     constant = tuple(q.name for q in quantities if q.name not in search.requested)
-    return replace(_finished(search, effects(scene), uncoupled_parts), constant=constant)
+    return replace(_complete_plan(search, effects(scene), uncoupled_parts), constant=constant)
 
 
-def _requested(
+def _requested_accuracies(
     scene: Scene, quantities: Sequence[Quantity], simpler: Sequence[Callable[[], Point]], watched: bool
 ) -> dict[str, float]:
     """Return the requested accuracy by quantity [SI]; relative ones refer to the size in the ideal mechanism. For
@@ -107,7 +107,7 @@ def _requested(
             point = run()
             if point.refused:
                 raise SolverError(f"{scene.name}: a simpler mechanism cannot be run: {point.refused}")
-            if _has(point, q):
+            if _has_quantity(point, q):
                 break
         sizes[q.name] = effect_size.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
         want = scene.accuracy.quantities[q.name]
@@ -126,7 +126,7 @@ def _requested(
     if all(accuracies[name] >= size for name, size in sizes.items()):
         # forces and rates may come from impacts alone
         more = simpler[1 if scene.contacts() or scene.stops() else 0]()
-        there = {q.name: effect_size.size(more, q) for q in quantities if _has(more, q)}
+        there = {q.name: effect_size.size(more, q) for q in quantities if _has_quantity(more, q)}
         sizes = {name: max(size, there.get(name, 0.0)) for name, size in sizes.items()}
     if all(accuracies[name] >= size for name, size in sizes.items()):
         q = quantities[0]
@@ -139,18 +139,18 @@ def _requested(
     return accuracies
 
 
-def _has(point: Point, quantity: Quantity) -> bool:
+def _has_quantity(point: Point, quantity: Quantity) -> bool:
     return any(name.rpartition(".")[0] == quantity.name for name in point.values)
 
 
-def _rigid(search: Search, dropped: Sequence[Effect]) -> Run:
+def _run_ideal(search: Search, dropped: Sequence[Effect]) -> Run:
     """Run the ideal mechanism."""
     run = integrate(search.runs.variant(dropped), {}, silent)
     search.runs.evaluations += int(run.trajectory.counters["evaluations"])
     return run
 
 
-def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], rigid: Run | None) -> None:
+def _decide_clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], rigid: Run | None) -> None:
     """Decide which joints keep their clearance: by bounds if only poses are requested, else by runs of rigid bodies."""
     asked = {t.owner for q in search.runs.chosen for t in q.terms() if KINDS[t.kind].owner in OF_CLEARANCE}
     for effect in loose:
@@ -163,36 +163,36 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     if rigid is not None and any(q.kind in OF_POSE for q in runs.chosen):
         bounded = dict(bounds(runs.scene, rigid, runs.chosen))
     reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
-    total = summed(reach.values(), search.requested)
+    total = sum_by_quantity(reach.values(), search.requested)
     if search.fits(total, BY_BOUND):
         search.spend(total)
         for effect in free:
             search.decide(effect, False, BOUND, "its effect is below the budget", reach[effect.name])
         return
-    shaken = any(effect.kind == FLEXIBILITY or effect.within for effect in runs.every)
+    flexible = any(effect.kind == FLEXIBILITY or effect.within for effect in runs.all_effects)
     ordered = sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf))
-    _in_turn(search, ordered, soft, reach, "its impacts change the requested quantities by less", shaken)
+    _drop_in_turn(search, ordered, soft, reach, "its impacts change the requested quantities by less", flexible)
 
 
-def _in_turn(
+def _drop_in_turn(
     search: Search,
     ordered: Sequence[Effect],
     others: Sequence[Effect],
     reach: Mapping[str, Mapping[str, float]],
     why: str,
-    shaken: bool,
+    flexible: bool,
 ) -> None:
     """Drop effects one after the other, as long as their joint effect size fits into the budget.
 
-    others: effects that no run has.  reach: bounds by effect, where known.  shaken: see `soft` of `widened`.
+    others: effects that no run has.  reach: bounds by effect, where known.  flexible: as of `Search.compare`.
     """
     runs, dropped, left = search.runs, list[Effect](), dict[str, float]()
     reference = runs.point(others)
     for effect in ordered:
         trial = [*dropped, effect]
-        sizes = widened(search, runs.between(runs.point([*others, *trial]), reference), shaken)
-        bound = summed([reach.get(e.name, {}) for e in trial], search.requested)
-        upper = {name: min(value, bound[name]) for name, value in upper_bounds(sizes).items()}
+        sizes, most = search.compare(runs.point([*others, *trial]), reference, flexible=flexible)
+        bound = sum_by_quantity([reach.get(e.name, {}) for e in trial], search.requested)
+        upper = {name: min(value, bound[name]) for name, value in most.items()}
         small = search.fits(upper)
         search.judge(effect, why if small else "", upper, sizes)
         if small:
@@ -201,7 +201,7 @@ def _in_turn(
         search.spend(left)
 
 
-def _interactions(search: Search, soft: Sequence[Effect]) -> None:
+def _decide_interactions(search: Search, soft: Sequence[Effect]) -> None:
     """Keep clearances that rigid bodies can do without but flexible bodies, excited by impacts, cannot.
 
     This concerns rates and forces only: vibrations after impacts are small in positions and large in rates and forces.
@@ -210,10 +210,9 @@ def _interactions(search: Search, soft: Sequence[Effect]) -> None:
     dropped = [e for e in search.dropped if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
     if not soft or not dropped or all(q.kind in OF_POSE for q in runs.chosen):
         return
-    fraction = runs.part(())
-    sizes = runs.between(runs.point(dropped, fraction=fraction), runs.point((), fraction=fraction))
-    sizes = widened(search, sizes, False, 0.0 if fraction == 1.0 else WHOLE)
-    upper = upper_bounds(sizes)
+    fraction = runs.affordable_part(())
+    changed, full = (runs.point(gone, fraction=fraction) for gone in (dropped, ()))
+    sizes, upper = search.compare(changed, full, fraction=fraction)
     if all(upper[name] <= BUDGET * requested for name, requested in search.requested.items()):
         return
     search.used = {}
@@ -221,12 +220,12 @@ def _interactions(search: Search, soft: Sequence[Effect]) -> None:
         search.judge(effect, "", upper, sizes)
 
 
-def summed(parts: Collection[Mapping[str, float]], requested: Mapping[str, float]) -> dict[str, float]:
+def sum_by_quantity(parts: Collection[Mapping[str, float]], requested: Mapping[str, float]) -> dict[str, float]:
     """Return the sum by quantity, infinite where a part lacks the quantity."""
     return {name: sum(part.get(name, np.inf) for part in parts) for name in requested}
 
 
-def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effect], rigid: Run | None) -> None:
+def _decide_flexibility(search: Search, soft: Sequence[Effect], loose: Sequence[Effect], rigid: Run | None) -> None:
     """Decide which bodies stay flexible."""
     if not soft:
         return
@@ -239,24 +238,26 @@ def _flexibilities(search: Search, soft: Sequence[Effect], loose: Sequence[Effec
         for effect in soft:
             own = {effect.owner: bundles[effect.owner]}
             single = together if len(soft) == 1 else response(rigid, own, search.runs.chosen)
-            bending[effect.name] = _with_margin(single.influence)
-        total = _with_margin(together.influence)
+            bending[effect.name] = _add_margin(single.influence)
+        total = _add_margin(together.influence)
         if search.fits(total):
             search.spend(total)
-            why = f"its effect is below the budget: {_vibrating(together)}"
+            why = f"its effect is below the budget: {_describe_vibration(together)}"
             for effect in soft:
                 search.decide(effect, False, RESPONSE, why, bending[effect.name])
             return
     ordered = sorted(soft, key=lambda e: max(bending.get(e.name, {}).values(), default=np.inf))
-    _in_turn(search, ordered, search.dropped, {}, "its deformation changes the requested quantities by less", False)
+    _drop_in_turn(
+        search, ordered, search.dropped, {}, "its deformation changes the requested quantities by less", False
+    )
 
 
-def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
+def _add_margin(influence: Mapping[str, float]) -> dict[str, float]:
     """Return a first-order response with its uncertainty."""
     return {name: OF_RESPONSE * value for name, value in influence.items()}
 
 
-def _vibrating(estimated: Response) -> str:
+def _describe_vibration(estimated: Response) -> str:
     """Describe the mechanism's first vibration, and the amplification of the first one that the loads excite."""
     first = f"the mechanism's first frequency is {estimated.first:.3g} Hz"
     if np.isnan(estimated.excited):
@@ -270,7 +271,7 @@ def _vibrating(estimated: Response) -> str:
     return f"{first}, and the loads of the ideal motion take {which} to {size}"
 
 
-def _confirm(search: Search, soft: Sequence[Effect]) -> None:
+def _confirm_clearances(search: Search, soft: Sequence[Effect]) -> None:
     """Test dropped clearances together with bodies that stay flexible, by one run of the whole scene.
 
     Bounds hold along the motion of rigid bodies, and flexible bodies may move differently.
@@ -279,18 +280,18 @@ def _confirm(search: Search, soft: Sequence[Effect]) -> None:
     dropped = [effect for effect in search.dropped if effect.kind == CLEARANCE]
     if not dropped or all(effect in search.dropped for effect in soft):
         return
-    fraction = min(1.0, MEMBERS * runs.part(()))
-    sizes = runs.between(runs.point(search.dropped, fraction=fraction), runs.must_run((), fraction, 0))
-    upper = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in sizes.items()}
+    fraction = min(1.0, MEMBERS * runs.affordable_part(()))
+    sizes = runs.differences(runs.point(search.dropped, fraction=fraction), runs.must_run((), fraction, 0))
+    upper = {name: (1.0 + possible_increase(fraction)) * i.difference for name, i in sizes.items()}
     if all(upper[name] <= requested for name, requested in search.requested.items()):
         return
     for effect in dropped:
         search.judge(effect, "", upper, sizes)
 
 
-def _others(search: Search) -> None:
+def _decide_others(search: Search) -> None:
     """Decide on gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows a small effect."""
-    every = {effect.name: effect for effect in search.runs.every}
+    every = {effect.name: effect for effect in search.runs.all_effects}
     others = [effect for effect in every.values() if effect.kind not in (CLEARANCE, FLEXIBILITY)]
     remaining = {d.effect.name: d.effect.kind for d in search.decisions.values() if d.kept}
     dear = {CLEARANCE, FLEXIBILITY} <= set(remaining.values())
@@ -306,7 +307,7 @@ def _others(search: Search) -> None:
             continue
         dropped = search.dropped
         reference, changed = search.runs.point(dropped), search.runs.point([*dropped, effect])
-        sizes = search.runs.between(changed, reference)
+        sizes = search.runs.differences(changed, reference)
         upper = upper_bounds(sizes)
         small = search.fits(upper)
         free = effect.kind in FREE or bool(effect.within)  # friction is dropped together with its contact
@@ -318,30 +319,29 @@ def _others(search: Search) -> None:
         search.judge(effect, "its effect is below the budget" if small else "", upper, sizes)
 
 
-def _chosen(search: Search) -> Chosen:
+def _choose_integration(search: Search) -> Integration:
     """Choose number of modes, integrator and tolerance for the remaining effects."""
     runs, dropped = search.runs, search.dropped
     scene = runs.variant(dropped)
     if scene.contacts() or scene.stops():
-        return cheapest(search)
+        return choose_with_contacts(search)
     for level in range(len(runs.fewer)):
         if not runs.modes(level, scene.flexible()):
             continue
-        sizes = widened(search, runs.between(runs.point(dropped, level=level), runs.point(dropped)), False)
-        upper = upper_bounds(sizes)
+        _, upper = search.compare(runs.point(dropped, level=level), runs.point(dropped))
         if search.fits(upper):
             search.spend(upper)
-            return smooth(runs, dropped, search.requested, level)
-    return smooth(runs, dropped, search.requested, None)
+            return choose_without_contacts(runs, dropped, search.requested, level)
+    return choose_without_contacts(runs, dropped, search.requested, None)
 
 
-def _finished(
+def _complete_plan(
     search: Search,
     every: Sequence[Effect],
     uncoupled_parts: tuple[str, ...],
 ) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
-    chosen = cheaper_method(search, _chosen(search))
+    chosen = cheaper_method(search, _choose_integration(search))
     if scene_is_cheaper(search, chosen):
         chosen = UNCHANGED
         for decision in [d for d in search.decisions.values() if not d.kept]:

@@ -92,7 +92,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
             np.array([requested.get(str(q), np.inf) for q in result["quantity"].values]),
         )
     reached = single["horizon"].values[np.isfinite(single["horizon"].values)]
-    certain, possible = _called_for(single, limits)
+    certain, possible = _needed_effects(single, limits)
     needs = f"model {join_names(certain)}" if certain else "no effect is certain to be needed"
     needs = needs if certain or possible else "no effect is needed"
     beyond = " beyond the horizon" if reached.size else ""
@@ -114,7 +114,7 @@ def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
     beyond = [w for w, sure in zip(words, single["decided"].values, strict=True) if not sure.all()]
     members = int(single["members"].max())
     until = " to ".join(dict.fromkeys(in_unit(time, "s") for time in (reached.min(), reached.max())))
-    more = [enough for enough, _ in (_deciding(single, i) for i in range(len(words))) if enough]
+    more = [enough for enough, _ in (_members_cell(single, i) for i in range(len(words))) if enough]
     said = f"undecided for {join_names(left)}" if left else "decided for each effect"
     text = f"Up to the horizon, t = {until}, all runs of a variant are one motion, and its change is {said}"
     if not beyond:
@@ -125,7 +125,7 @@ def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
     )
 
 
-def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
+def _needed_effects(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
     """Return effects whose change certainly exceeds its limit, up to the horizon or beyond it, and effects whose change
     may exceed it by chance."""
     change, chance = single["dropped"].values, single["dropped_uncertainty"].values
@@ -139,7 +139,7 @@ def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list
     ]
 
 
-def _deciding(result: xr.Dataset, i: int) -> tuple[int, str]:
+def _members_cell(result: xr.Dataset, i: int) -> tuple[int, str]:
     """Return how many members would decide what is undecided of an effect, 0 for none, and a cell of a table on it."""
     members = int(result["members"][i])
     changes = [
@@ -171,7 +171,7 @@ def table(result: xr.Dataset) -> Table:
         members, until = int(result["members"][i]), float(result["horizon"][i])
         if np.isfinite(until):
             rows.append((f"{words}, up to {in_unit(until, 's')}", *cells["early"], "one motion"))
-            rows.append((f"{words}, whole run", *cells["dropped"], _deciding(result, i)[1]))
+            rows.append((f"{words}, whole run", *cells["dropped"], _members_cell(result, i)[1]))
         else:
             rows.append((words, *cells["dropped"], str(members) if members else "one run"))
         if "added" in cells and result["effect"][i] != IDEAL:

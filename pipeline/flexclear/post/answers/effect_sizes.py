@@ -82,7 +82,7 @@ def variants(effects: Sequence[Effect]) -> list[Names]:
     """Return the necessary variants, each once: full, bare, and each effect and pair removed and added."""
     every = frozenset(effect.name for effect in effects)
     chosen = [frozenset(pair) for n in (0, 1, 2) for pair in combinations(every, n)]
-    sets = [with_dependents(effects, gone) for few in chosen for gone in (few, every - closed_up(effects, few))]
+    sets = [with_dependents(effects, gone) for few in chosen for gone in (few, every - with_owners(effects, few))]
     return list(dict.fromkeys(sorted(sets, key=lambda names: (len(names), sorted(names)))))
 
 
@@ -91,7 +91,7 @@ def with_dependents(effects: Sequence[Effect], gone: Names) -> Names:
     return gone | {effect.name for effect in effects if effect.within in gone}
 
 
-def closed_up(effects: Sequence[Effect], present: Names) -> Names:
+def with_owners(effects: Sequence[Effect], present: Names) -> Names:
     """Return the effects with those within which they exist."""
     return present | {effect.within for effect in effects if effect.name in present and effect.within}
 
@@ -169,10 +169,10 @@ def with_pairs(
     for one, other in product(effects, repeat=2):
         pair = frozenset({one.name, other.name})
         # an effect within another one is added on top of that one
-        ground = every - (closed_up(effects, pair) - pair)
-        bare, gained = points.get(ground, UNKNOWN), points[every - closed_up(effects, pair)]
+        ground = every - (with_owners(effects, pair) - pair)
+        bare, gained = points.get(ground, UNKNOWN), points[every - with_owners(effects, pair)]
         lost = points[with_dependents(effects, pair)]
-        single = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
+        single = [points.get(ground - with_owners(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
         i, j = names.index(one.name), names.index(other.name)
         for k, quantity in enumerate(chosen):
             found = {"added_pair": change(gained, bare, quantity, members)}
@@ -250,7 +250,7 @@ def staying_contacts_sentence(names: Sequence[str]) -> str:
 def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
     """Draw bars of the sizes of single effects, a panel for each quantity; a line where an accuracy is requested.
 
-    Uses `dropped` and, where they exist, `added` or `early`.
+    Uses `dropped` and, where they exist, `added` or `early`, with their uncertainties.
     """
     from matplotlib.ticker import NullFormatter
 
@@ -265,7 +265,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
         for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):
                 values = dataset[kind].values[:, k]
-                by_chance = np.nan_to_num(dataset.get(f"{kind}_uncertainty", 0.0 * dataset[kind]).values[:, k])
+                by_chance = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
                 rows = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(rows, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])

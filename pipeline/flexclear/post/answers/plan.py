@@ -77,10 +77,8 @@ def _texts(words: Iterable[str]) -> np.ndarray:
 
 def upper_bounds(planned: xr.Dataset) -> xr.Dataset:
     """Return the upper bounds of a plan's effect sizes, as the chart takes them."""
-    return xr.Dataset(
-        {"dropped": planned["influence"] + planned["uncertainty"].fillna(0.0)},
-        coords={"effect": planned["effect"], "quantity": planned["quantity"], "unit": planned["unit"]},
-    )
+    most = planned["influence"] + planned["uncertainty"].fillna(0.0)
+    return xr.Dataset({"dropped": most, "dropped_uncertainty": 0.0 * most}, {"unit": planned["unit"]})
 
 
 def table(planned: xr.Dataset) -> Table:

@@ -41,7 +41,7 @@ distance | | 1 | largest distance from the scene's own run up to the horizon, as
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class MeasuredRun:
     """One run of a study: its integrator, and its tolerance or its fixed step [s]; the other one is None."""
 
     key: str
@@ -51,7 +51,7 @@ class Point:
 
 
 def reference_and_confirmation(
-    points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]
+    points: Sequence[MeasuredRun], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]
 ) -> tuple[str, str]:
     """Return the names of the reference and of the run that confirms it; the latter is empty where there is none.
 
@@ -68,13 +68,13 @@ def reference_and_confirmation(
     others = others or [p for _, p in accepted if p is not best]
     until, reference = comparable_until(runs), runs[best.key]
 
-    def distance(point: Point) -> float:
+    def distance(point: MeasuredRun) -> float:
         return max(relative_errors(runs[point.key], reference, chosen, until), default=0.0)
 
     return best.key, next((p.key for p in sorted(others, key=distance)), "")
 
 
-def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
+def assemble(points: Sequence[MeasuredRun], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
     """Return the study's dataset over (run, quantity); `runs` holds the result of each point, by key, and OWN.
 
     A run that was refused has no values: its entry is NaN and its reason is in `refused`. Raises SolverError where
@@ -153,10 +153,11 @@ def cost(run: xr.Dataset, name: str) -> float:
 
 
 def relative_errors(run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity], until: float) -> np.ndarray:
-    """Return the largest errors up to a time [s] as fractions of the quantities' sizes."""
-    return np.array(
-        [relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen]
-    )
+    """Return the largest errors up to a time [s] as fractions of the quantities' sizes; as they are for a size of
+    zero."""
+    scales = [quantities.scale(reference, q) for q in chosen]
+    errors = [quantities.error(run, reference, q, until) for q in chosen]
+    return np.array([error / scale if scale > 0.0 else error for error, scale in zip(errors, scales, strict=True)])
 
 
 def comparable_until(runs: Mapping[str, xr.Dataset]) -> float:
@@ -167,13 +168,8 @@ def comparable_until(runs: Mapping[str, xr.Dataset]) -> float:
     return min((float(run["horizon"]) for run in runs.values() if "horizon" in run), default=np.inf)
 
 
-def relative(error: float, scale: float) -> float:
-    """Return an error as a fraction of a size; the error itself for a size of zero."""
-    return error / scale if scale > 0.0 else error
-
-
 def sentences(study: xr.Dataset) -> str:
-    """Return the answer in words; study: of `stages.cost_study`."""
+    """Return the answer in words; study: of `stages.studies`."""
     return " ".join(filter(None, (_own_method_sentence(study), _digit(study), *skipped_sentence(study))))
 
 
@@ -219,11 +215,8 @@ TARGETS = (1e-3, 1e-6, 1e-9)
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
 
 
-def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Table:
-    """Tabulate settings, cost and error for 1e-3, 1e-6 and 1e-9, by the worst of all quantities.
-
-    notes: further notes of the table.
-    """
+def price_list(study: xr.Dataset, title: str) -> Table:
+    """Tabulate settings, cost and error for 1e-3, 1e-6 and 1e-9, by the worst of all quantities."""
     rows = []
     for target in TARGETS:
         choice = cheapest(study, target)
@@ -235,7 +228,7 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
             rows.append(
                 (f"{target:g}", choice.name, f"{choice.evaluations:.0f}", seconds, f"{choice.error:.1e}", choice.worst)
             )
-    return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
+    return Table(title, COLUMNS, tuple(rows), tuple(_notes(study)))
 
 
 def _absent(study: xr.Dataset) -> str:
@@ -300,7 +293,7 @@ def _notes(study: xr.Dataset) -> list[str]:
         notes.append(f"Pointwise errors count up to the predictability horizon, t = {study.attrs['horizon']:.4g} s.")
     if study.attrs["refused"]:
         notes.append(f"Refused: {study.attrs['refused']}.")
-    return notes
+    return notes + skipped_sentence(study)
 
 
 def _confirmation_sentence(study: xr.Dataset) -> str:

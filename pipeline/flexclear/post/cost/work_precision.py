@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -33,32 +32,25 @@ class Curve:
     seconds: np.ndarray
     error: np.ndarray
     resolved: np.ndarray
-    note: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A single point with a name: the paper's own choice, or another program. error: by quantity."""
+def make(name: str, study: xr.Dataset, title: str, others: Sequence[Curve] = ()) -> dict[str, bytes]:
+    """Draw ``<name>.png`` and ``.svg``, with the scene's own run as a star.
 
-    name: str
-    seconds: float
-    error: dict[str, float]
-
-
-def make(
-    name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = (), others: Sequence[Curve] = ()
-) -> dict[str, bytes]:
-    """Draw ``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
+    others: curves of other programs, which take no part in the Pareto front.
+    """
     chosen = [str(q) for q in study["quantity"].values]
     drawn = curves(study)
     recorded = float(study["recording_seconds"].median())
     with style():
         figure, axes = panels(len(chosen), COLUMNS, 10.5, 1.1, 2.7)
         for k, ax in enumerate(axes):
-            _panel(ax, chosen[k], k, (drawn, others), marks, MARGIN * float(study["reference_uncertainty"].values[k]))
+            _panel(ax, chosen[k], k, (drawn, others), MARGIN * float(study["reference_uncertainty"].values[k]))
+            if "own_error" in study:
+                _star(ax, study.isel(quantity=k))
             if np.isfinite(recorded):  # the cost of a run's record, which does not depend on the method
                 ax.axvline(recorded, color=SOFT, linewidth=0.9, linestyle=":", zorder=0)
-        _legend(figure, drawn, others, marks)
+        _legend(figure, drawn, others)
         heading(figure, title, _subtitle(study))
         return files(name, figure)
 
@@ -81,25 +73,11 @@ def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
     return np.array(front, dtype=int)
 
 
-def peers(study: xr.Dataset, tracks: Sequence[Mapping[str, Any]]) -> list[Curve]:
-    """Return curves of another program's runs. tracks: name, note, seconds [s] and errors [SI] by quantity."""
-    lines = []
-    for track in tracks:
-        seconds = np.array(track["seconds"], dtype=float)
-        error = np.full((len(seconds), study.sizes["quantity"]), np.nan)
-        for k, name in enumerate(study["quantity"].values):
-            if str(name) in track["error"]:
-                error[:, k] = np.array(track["error"][str(name)], dtype=float) / float(study["scale"][k])
-        lines.append(Curve(track["name"], seconds, error, np.isfinite(error), track["note"]))
-    return lines
-
-
 def _panel(
     ax: Axes,
     name: str,
     k: int,
     curves_of: tuple[Sequence[Curve], Sequence[Curve]],
-    marks: tuple[Mark, ...],
     bound: float,
 ) -> None:
     """Draw one quantity. curves_of: ours, and others'. bound: error below which the reference cannot measure."""
@@ -112,14 +90,6 @@ def _panel(
     error = np.concatenate([np.where(c.resolved[:, k], c.error[:, k], np.nan) for c in own])
     front = pareto(seconds, error)
     ax.plot(seconds[front], error[front], color=INK, linewidth=3.0, alpha=0.18, zorder=0)
-    for m in marks:
-        if np.isfinite(m.error.get(name, np.nan)):
-            ax.plot(m.seconds, m.error[name], "*", color=INK, markersize=9, zorder=5)
-            # on the side with more space
-            side, shift = ("right", -4) if m.seconds > 0.5 * np.nanmax(seconds) else ("left", 4)
-            ax.annotate(
-                m.name, (m.seconds, m.error[name]), xytext=(shift, 4), textcoords="offset points", fontsize=6.8, ha=side
-            )
     ax.set(xscale="log", yscale=scale_of(ax), title=name)
     set_plain_numbers(ax.xaxis)
     if np.isinf(bound):
@@ -132,6 +102,18 @@ def _panel(
     ax.set(xlabel="CPU time of the integration (s)", ylabel="relative error")
 
 
+def _star(ax: Axes, study: xr.Dataset) -> None:
+    """Mark the scene's own run. study: of one quantity."""
+    error = float(study["own_error"]) - float(study["reference_uncertainty"].fillna(0.0))
+    if not np.isfinite(error):
+        return
+    seconds = study.attrs["own_seconds"]
+    ax.plot(seconds, error, "*", color=INK, markersize=9, zorder=5)
+    # its name on the side with more space
+    side, shift = ("right", -4) if seconds > 0.5 * float(study["cpu_seconds"].max()) else ("left", 4)
+    ax.annotate("this scene", (seconds, error), (shift, 4), textcoords="offset points", fontsize=6.8, ha=side)
+
+
 def curve_look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
     """Return colour and mark of a curve; grey ones for other programs."""
     if curve.name in LOOKS:
@@ -139,7 +121,7 @@ def curve_look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
     return SOFT, "xd+*"[list(others).index(curve) % 4] if curve in others else "x"
 
 
-def _legend(figure: Figure, own: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
+def _legend(figure: Figure, own: list[Curve], others: Sequence[Curve]) -> None:
     handles: list[Artist] = []
     for curve in (*own, *others):
         color, mark = curve_look(curve, others)
@@ -147,8 +129,6 @@ def _legend(figure: Figure, own: list[Curve], others: Sequence[Curve], marks: tu
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
     handles.append(Patch(color=GRID, label="cannot be determined"))
     handles.append(Line2D([], [], color=SOFT, linewidth=0.9, linestyle=":", label="recording, the same for all"))
-    if marks:
-        handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), fontsize=8.4)
 
 

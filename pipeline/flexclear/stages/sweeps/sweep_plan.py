@@ -26,7 +26,7 @@ from flexclear.scene.sweep import Axis, Design, Sweep, design
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.sweeps.sweep_engine import Job
-from flexclear.stages.sweeps.sweep_points import Family as Work
+from flexclear.stages.sweeps.sweep_points import Work
 from flexclear.stages.workplace import Workplace, check
 from flexclear.system.errors import InputError
 from flexclear.system.machine import instruction_set

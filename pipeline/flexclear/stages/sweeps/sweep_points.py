@@ -35,7 +35,7 @@ RUNNERS = 8
 
 
 @dataclass(frozen=True)
-class Family:
+class Work:
     """Points that share a scene and its flexible bodies.
 
     simulate: the scene, as parameters of the simulate stage. inputs: those of that stage by name. keep: names of the
@@ -55,7 +55,7 @@ def _open_family(key: str, packed: bytes) -> tuple[Scene, Runner]:
     """Return scene and runner of a family; cached, since the runner holds the compiled functions."""
     from flexclear.dynamics.record.point import Runner
 
-    family: Family = pickle.loads(packed)
+    family: Work = pickle.loads(packed)
     scene = rebuild(family.simulate, family.inputs)
     recorded = [parse_recorded(name, scene.owners()) for name in family.keep]
     return scene, Runner(bundles(family.inputs), recorded, family.members, family.error, scaled=False)
@@ -71,7 +71,7 @@ def work(
 ) -> tuple[list[Point], float]:
     """Run points of a family; return them and the processor time that they took [s].
 
-    packed: the pickled `Family`. points: key path in the scene -> value. others_idle: whether no other worker is busy.
+    packed: the pickled `Work`. points: key path in the scene -> value. others_idle: whether no other worker is busy.
     together: whether points are evaluated together; no result depends on it. sources: digest of the caller's sources
     when the caller is on another machine; InputError when this worker's differ, as those of a worker that joined later
     may.
