@@ -23,7 +23,7 @@ from flexclear.scene.quantity import parse_recorded
 from flexclear.stages.scenes import bundles
 from flexclear.stages.simulation import params
 from flexclear.stages.sweeps.sweep_engine import Job, engine
-from flexclear.stages.sweeps.sweep_points import Family as Points
+from flexclear.stages.sweeps.sweep_points import Work as Points
 
 #: timed points of each kind; two earlier points are not timed
 POINTS = 24

@@ -173,7 +173,6 @@ def test_contacts_beyond_the_horizon_do_not_count():
 def test_the_answer_has_the_time_and_the_error_up_to_the_horizon():
     found, *_ = study(horizon=0.5)
     found.attrs |= {"own_rtol": 1e-9, "own_integrator": "dop853", "own_seconds": 0.2, "own_evaluations": 2e3}
-    found.attrs["flexible"] = 0
     found["own_error"] = (("quantity",), np.full(found.sizes["quantity"], 1e-6))
     text = cost_study.sentences(found)
     assert "the integration takes 0.2 s of processor time (2000 evaluations)" in text

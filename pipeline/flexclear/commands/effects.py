@@ -9,7 +9,6 @@ from flexclear.stages.export import as_json
 from flexclear.stages.scenes import graphs, print_files, scene_arguments
 from flexclear.stages.workplace import open_workplace, seconds
 from flexclear.study.answers import answer_of, shown_answer
-from flexclear.study.effects import examine_effects
 from flexclear.study.members import MEMBERS
 from flexclear.system.errors import InputError
 
@@ -45,10 +44,7 @@ def command(options: argparse.Namespace) -> None:
     workplace, members = open_workplace(options), options.members or MEMBERS[0]
     datasets: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
-        if budget is None:
-            made = examine_effects(graph.scene, workplace, (members,), options.of, pairs=True)
-        else:
-            made = answer_of("effects", graph.scene, workplace, budget, options.of)
+        made = answer_of("effects", graph.scene, workplace, budget, options.of, members)
         if options.json:
             datasets[graph.scene.name] = made.dataset()
             continue

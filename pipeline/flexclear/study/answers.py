@@ -73,11 +73,10 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, of: Sequence
     """
     from flexclear.post.answers.answered import with_answer
 
-    place, given = open_workplace(), None if budget is None else seconds(budget, "budget")
-    workplace = replace(place, jobs=1)  # in this process: a worker would run a caller's script again from its top
-    if name == "effects" and given is None:
-        answer = effects.examine_effects(scene, place, of=of, pairs=True)
-    elif name == "cost":
+    workplace, given = open_workplace(), None if budget is None else seconds(budget, "budget")
+    if name != "effects" or given is not None:
+        workplace = replace(workplace, jobs=1)  # in this process: a worker would run a caller's script again
+    if name == "cost":
         name, answer = "accuracy", cost.measure_costs(scene, workplace, budget=given or cost.BUDGET)
     else:
         answer = answer_of(name, scene, workplace, given, of)
@@ -86,11 +85,21 @@ def dataset(name: str, scene: Scene, budget: str | float | None, *, of: Sequence
     return with_answer(answer.dataset(), words.text, picture, words.table)
 
 
-def answer_of(name: str, scene: Scene, workplace: Workplace, budget: float | None, of: Sequence[str] = ()) -> Made:
+def answer_of(
+    name: str,
+    scene: Scene,
+    workplace: Workplace,
+    budget: float | None,
+    of: Sequence[str] = (),
+    members: int = MEMBERS[0],
+) -> Made:
     """Return the answer called stability or effects, for the whole budget of processor time [s]; of: as of `Answers`.
 
-    Raises InputError for a scene without effects or watched quantities.
+    Without a budget effects are also added, and combined in pairs, over this number of members. Raises InputError for a
+    scene without effects or watched quantities.
     """
+    if name == "effects" and budget is None:
+        return effects.examine_effects(scene, workplace, (members,), of, pairs=True)
     answer: Made = getattr(Answers(scene, workplace, budget, 1, of), name)
     return answer
 

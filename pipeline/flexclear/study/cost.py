@@ -103,7 +103,7 @@ class Study:
             "points": [{"key": d.key, **d.setting} for d in others],
             "quantities": [q.written() for q in chosen or self.scene.watched_quantities()],
             "title": self.scene.title,
-            "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
+            "own": {f"own_{name}": value for name, value in own.setting.items()},
             "complete": self._complete and not self.undone,
             "undone": _list_names([d.key for d in self.undone]),
         }

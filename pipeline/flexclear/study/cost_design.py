@@ -44,12 +44,6 @@ class Setting:
     step: float | None = None
     evaluations: int = 0
 
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """Setting as attributes of a study."""
-        setting = {"own_rtol": self.rtol} if self.step is None else {"own_step": self.step}
-        return {"own_integrator": self.integrator, **setting}
-
 
 @dataclass(frozen=True)
 class Design:

@@ -108,21 +108,15 @@ def scene_is_cheaper(search: Search, chosen: Integration) -> bool:
     fraction, limit = runs.affordable_part(dropped), OF_TIGHT * runs.extent.most
     ways = {"integrator": chosen.integrator, "rtol": chosen.rtol, "evaluations": limit}
     planned = runs.point(dropped, level=chosen.level, fraction=fraction, members=0, **ways)
-    full = runs.point((), fraction=fraction, members=0, integrator=integrator, rtol=rtol, evaluations=limit)
-    taken = limit if TAKES_LONG in full.refused else full.evaluations
+
+    def evaluations(integrator: str, rtol: float) -> int:
+        full = runs.point((), fraction=fraction, members=0, integrator=integrator, rtol=rtol, evaluations=limit)
+        return limit if TAKES_LONG in full.refused else full.evaluations
+
+    taken = evaluations(integrator, rtol)
     if scene.by_need() and taken > fraction * AFFORDABLE:
-        full = runs.point(
-            (),
-            fraction=fraction,
-            members=0,
-            integrator=STIFF,
-            rtol=scene_without_comparison(scene).solver.rtol,
-            evaluations=limit,
-        )
-        taken = limit if TAKES_LONG in full.refused else full.evaluations
-    if planned.refused or not taken:
-        return bool(planned.refused)
-    return CHEAPER * planned.evaluations / fewer > taken
+        taken = evaluations(STIFF, scene_without_comparison(scene).solver.rtol)
+    return bool(planned.refused) or 0 < taken < CHEAPER * planned.evaluations / fewer
 
 
 def _is_within(error: Mapping[str, float], requested: Mapping[str, float]) -> bool:
