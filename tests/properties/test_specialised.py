@@ -16,6 +16,7 @@ from flexclear.dynamics.mechanics.of_topology import program_of
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
+from flexclear.dynamics.run.evaluation import engine as engines
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
@@ -93,8 +94,9 @@ def engine(integrator: str = "dop853") -> Engine:
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that reads more of some evaluations than the rates
-def test_compiled_steps_evaluate_as_the_record_does(integrator: str) -> None:
+def test_compiled_steps_evaluate_as_the_record_does(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Straight code of the steps, and the list that stores all, at states of a stroke with impacts."""
+    monkeypatch.setattr(engines, "LONG", 0)
     one = engine(integrator)
     run = integrate(one, consistent_start(one), silent)
     assert one.h[m.RATES] != one.h[m.EVALUATE]
@@ -111,6 +113,7 @@ def test_compiled_steps_evaluate_as_the_record_does(integrator: str) -> None:
 
 def test_what_is_too_long_runs_a_list_and_is_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tracing, "LONGEST_STRAIGHT", 10)
+    monkeypatch.setattr(engines, "LONG", 0)
     monkeypatch.setattr(specialised_code, "_known", {})
     scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
     with monkeypatch.context() as patch, TemporaryDirectory() as folder:
@@ -129,6 +132,7 @@ def test_what_is_too_long_runs_a_list_and_is_differentiated(monkeypatch: pytest.
 
 def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
     one = engine()
+    one.specialised.worthwhile = True
     one.settle(silent)
     straight, kept = int(one.h[m.RATES]), one.selected.copy()
     assert straight != one.h[m.EVALUATE]

@@ -284,6 +284,7 @@ class Simulation:
             parts.append(np.ascontiguousarray(array).tobytes())
         own = {"integrator": self._here().model.scene.solver.integrator, "begun": self._begun, "lost": self._lost}
         own["met"] = [rows.hex() for rows in self._engine.specialised.rows]
+        own["worthwhile"] = self._engine.specialised.worthwhile
         own |= {"targets": self.inputs.targets, "turns": self._turns, "arrays": described}
         body = self._key + json.dumps(own).encode() + b"\n" + b"".join(parts)
         return MARK + hashlib.sha256(body).digest() + body
@@ -322,7 +323,7 @@ class Simulation:
         engine = self._engine
         engine.model.arrays.rows(m.PIECES)[:] = arrays["laws"]
         self.inputs.model = engine.model
-        engine.specialised.rows[:] = map(bytes.fromhex, own["met"])
+        engine.specialised.rows[:], engine.specialised.worthwhile = map(bytes.fromhex, own["met"]), own["worthwhile"]
         remember(engine, arrays)
         self._tape = tape = trajectory.blank(engine, NO_OUTPUTS)
         tape.selections.append((self.time, engine.selected.copy()))

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
@@ -109,16 +108,10 @@ class Entry:
         function("prescribe", self.addresses["prescribe"])(*places(arrays), t)
 
 
-def entry(
-    parts: Parts, scheme: Scheme, report: Callable[[str], None], equations: Mapping[str, str] = MappingProxyType({})
-) -> Entry:
-    """Return the compiled functions for these parts; `report` receives a message for each function to compile.
-
-    equations: sources by name of specialised code.
-    """
+def entry(parts: Parts, scheme: Scheme, report: Callable[[str], None]) -> Entry:
+    """Return the compiled functions for these parts; `report` receives a message for each function to compile."""
     folder, began = writable(kernel_root(), report), time.monotonic()
-    texts = {**sources.sources(parts, scheme), **equations}
-    files = {name: _file(folder, name, source) for name, source in texts.items()}
+    files = {name: _file(folder, name, source) for name, source in sources.sources(parts, scheme).items()}
     _load(folder, files, report, began)
     return Entry({name: loaded[path.stem].address for name, path in files.items()})
 

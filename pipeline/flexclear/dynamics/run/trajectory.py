@@ -205,7 +205,7 @@ def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 
 def begin(engine: Engine, y: np.ndarray, outputs: np.ndarray, progress: Progress) -> Tape:
     """Return a tape with its first row; begin contacts that are closed at the start; prepare a singular start."""
-    engine.specialised.rows.clear()
+    engine.specialised.begin()
     y = _sampler(engine)(y, engine.start)
     tape = _prepare(engine, y, engine.start, outputs)
     first = recording.record(tape.rows[:1], len(engine.model.contacts))
@@ -229,7 +229,7 @@ def _ready(engine: Engine, tape: Tape, progress: Progress) -> Tape:
 
 def resume(engine: Engine, left: Handover, outputs: np.ndarray, progress: Progress) -> Tape:
     """Return a tape with another method's record, and set the engine to that method's last state."""
-    engine.specialised.rows.clear()
+    engine.specialised.begin()
     here, before = left.here, left.tape
     tape, n = _prepare(engine, here.y, left.time, outputs), engine.n
     cap = n[m.CAP]

@@ -28,7 +28,6 @@ from flexclear.dynamics.run.evaluation.specialised_code import (
     address,
     call_list,
     code_address,
-    equations,
 )
 from flexclear.dynamics.run.evaluation.without_compiler import IN_PYTHON, Uncompiled
 from flexclear.scene.loads import SampledPid
@@ -39,6 +38,8 @@ from flexclear.system.progress import Progress, silent
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: first selections of closure rows of an integration, whose steps are specialised; those of others run lists
 SELECTIONS = 4
+#: evaluations after which a run uses specialised code, which takes a second to compile and saves up to a fifth
+LONG = 40_000
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,9 @@ class Engine:
 
     def _specialises(self, rows: bytes) -> bool:
         """Return True when steps for closure rows that the integration has met use specialised code, if that exists."""
-        return bool(self.specialised.rows.index(rows) < SELECTIONS or self.h[m.N_CHANGES])
+        known = self.specialised
+        worthwhile = (known.exact or known.worthwhile) and known.rows.index(rows) < SELECTIONS
+        return bool(worthwhile or self.h[m.N_CHANGES])
 
     @property
     def _lists(self) -> dict[int, int]:
@@ -164,10 +167,11 @@ class Engine:
     def settle(self, progress: Progress) -> None:
         """Let further steps use specialised code or routines for the selected rows, at a place together with others.
 
-        The selections that the integration has met decide, so an interrupted integration continues with the same code
-        as an uninterrupted one.
+        The selections that the integration has met, and the number of its evaluations, decide; so an interrupted
+        integration continues with the same code as an uninterrupted one.
         """
         specialised, rows = self.specialised, self.selected.tobytes()
+        specialised.worthwhile |= bool(self.n[m.EVALUATIONS] >= LONG)
         if specialised.place is not None and specialised.group is None and self.staged:
             where = code_address(
                 self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact
@@ -288,8 +292,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     refuse_singular(model, mobility)
     if IN_PYTHON.get():
         return uncompiled(model, mobility)
-    alone = equations(model, mobility)
-    entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
+    entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text))
     engine = assemble(model, entry, METHODS[solver.integrator], mobility)
     if not mobility.redundant:
         engine.connect(progress)
