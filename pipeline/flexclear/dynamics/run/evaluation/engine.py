@@ -38,8 +38,8 @@ from flexclear.system.progress import Progress, silent
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: first selections of closure rows of an integration, whose steps are specialised; those of others run lists
 SELECTIONS = 4
-#: evaluations after which a run uses specialised code, which takes a second to compile and saves up to a fifth
-LONG = 40_000
+#: evaluations after which a run uses specialised code, which takes LLVM a second and saves up to a fifth of an evaluation
+LONG = 100_000
 
 
 @dataclass(frozen=True)
