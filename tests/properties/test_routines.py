@@ -339,7 +339,7 @@ def inertia_parts(random: np.random.Generator) -> tuple[Symmetric, Matrix, Symme
 #: ways of steps, and what makes the engine take them
 WAYS: dict[str, dict[str, Any]] = {
     "list of a short run": {},
-    "list where straight code would be too long": {"LONG": 0, "address": lambda *given, **more: 0},
+    "list where straight code would be too long": {"LONG": 0, "address_for_rows": lambda *given, **more: 0},
     "list of a fifth selection": {"LONG": 0, "SELECTIONS": 0},
     "straight code": {"LONG": 0},
 }

@@ -118,7 +118,7 @@ def test_what_is_too_long_runs_a_list_and_is_differentiated(monkeypatch: pytest.
     scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
     with monkeypatch.context() as patch, TemporaryDirectory() as folder:
         patch.setenv("FLEXCLEAR_KERNELS", folder)
-        patch.setattr(compiler_process, "requested", lambda: False)  # it would compile what this process refuses
+        patch.setattr(compiler_process, "is_useful", lambda: False)  # it would compile what this process refuses
         patch.setattr(files, "loaded", {})
         patch.setattr(functions, "loaded", files.loaded)
         one = engine_of(scene, {}, silent)
@@ -164,7 +164,7 @@ def test_equal_topologies_give_equal_code(lanes: int) -> None:
 
 def test_friction_of_ideal_joints_is_in_what_steps_evaluate() -> None:
     parts = tabulate(build(load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), {})).parts
-    assert "joint_friction" in sources.specialised(parts, ())
+    assert "joint_friction" in sources.source_of_steps(parts, ())
 
 
 def test_a_magnitude_is_never_below_zero_and_may_be_below_more() -> None:
@@ -202,7 +202,7 @@ def test_lanes_of_a_loop_turn_as_often_as_each_alone(lanes: int) -> None:
     where = lambda array, index, lane: builder.gep(function.args[0], [INT(3 * lane + index)])  # noqa: E731
     Emitter(builder, made, where, lanes, exact=True).emit()
     builder.ret_void()
-    code = machine_code.load(machine_code.stored("f", *machine_code.assembled(str(builder.module))))
+    code = machine_code.load(machine_code.image_of_module("f", *machine_code.assemble(str(builder.module))))
     for k in range(0, len(states), lanes):
         CFUNCTYPE(None, c_void_p)(code.address)(states[k:].ctypes.data)
     assert states[:, 0] == pytest.approx(np.sqrt(states[:, 1]), rel=1e-15)

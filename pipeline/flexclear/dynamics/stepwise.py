@@ -23,7 +23,7 @@ from flexclear.dynamics.record.dataset import variables_for
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.run import trajectory
 from flexclear.dynamics.run.evaluation import closure_rows
-from flexclear.dynamics.run.evaluation.engine import Engine, another
+from flexclear.dynamics.run.evaluation.engine import Engine, copy_of_engine
 from flexclear.dynamics.run.evaluation.observation import observe_with, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.inputs import Inputs
@@ -109,7 +109,7 @@ class Simulation:
 
     def _use(self, engine: Engine) -> None:
         """Step with this engine; states are observed by another one, so that reading changes no bit of the motion."""
-        self._engine, self._watch = engine, another(engine)
+        self._engine, self._watch = engine, copy_of_engine(engine)
         self._seen: observation.Blocks | None = None
 
     def advance(self, duration: float) -> None:

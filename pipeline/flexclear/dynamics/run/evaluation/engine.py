@@ -25,7 +25,7 @@ from flexclear.dynamics.run import bushings, joint_friction
 from flexclear.dynamics.run.evaluation import table_ranges
 from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
-    address,
+    address_for_rows,
     call_list,
     code_address,
 )
@@ -38,7 +38,7 @@ from flexclear.system.progress import Progress, silent
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: first selections of closure rows of an integration, whose steps are specialised; those of others run lists
 SELECTIONS = 4
-#: evaluations after which a run uses specialised code, which takes LLVM a second and saves up to a fifth of an evaluation
+#: evaluations after which specialised code pays: it takes LLVM a second and saves up to a fifth of an evaluation
 LONG = 100_000
 
 
@@ -139,7 +139,7 @@ class Engine:
             calls = call_list(self.model, self.h, known, rows, progress, where)
             self.h[at], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data
         self.h[m.RATES], met = self.h[m.EVALUATE], rows in known.rows
-        if met and not (self._specialises(rows) and address(self.model, self.h, known, rows, progress)):
+        if met and not (self._specialises(rows) and address_for_rows(self.model, self.h, known, rows, progress)):
             calls = call_list(self.model, self.h, known, rows, progress)
             self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
         elif met:
@@ -190,7 +190,7 @@ class Engine:
         """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
         group, record = self.specialised.group, (outputs, rows, events)
         if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
-            words = [*functions.places(self._arrays()), *functions.record(*record)]
+            words = [*functions.addresses_of_arrays(self._arrays()), *functions.record(*record)]
             group.advance(self.entry.addresses["advance"], words)
         else:
             self.entry.advance(self._arrays(), *record)
@@ -291,7 +291,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     progress(None, mobility.text())
     refuse_singular(model, mobility)
     if IN_PYTHON.get():
-        return uncompiled(model, mobility)
+        return engine_in_python(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text))
     engine = assemble(model, entry, METHODS[solver.integrator], mobility)
     if not mobility.redundant:
@@ -299,7 +299,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     return engine
 
 
-def uncompiled(model: Model, mobility: Mobility) -> Engine:
+def engine_in_python(model: Model, mobility: Mobility) -> Engine:
     """Return the engine of a model that Python evaluates."""
     return assemble(model, Uncompiled.of(model), METHODS[model.scene.solver.integrator], mobility)
 
@@ -314,7 +314,7 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     return engine
 
 
-def another(engine: Engine) -> Engine:
+def copy_of_engine(engine: Engine) -> Engine:
     """Return a new engine of the same model, in the state before any run."""
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
     made.specialised.exact = engine.specialised.exact

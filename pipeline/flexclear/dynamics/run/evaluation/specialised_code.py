@@ -64,7 +64,9 @@ class SpecialisedCode:
         self.worthwhile = False
 
 
-def address(model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent) -> int:
+def address_for_rows(
+    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
+) -> int:
     """Return the address of specialised code for closure rows; 0 when there is none."""
     if rows not in code.addresses:
         code.addresses[rows] = code_address(model, h, rows, progress, exact=code.exact)
@@ -79,7 +81,7 @@ def call_list(
     where: the place in h of its address, of which another list has another one (`mechanics.of_topology`).
     """
     from flexclear.dynamics.mechanics.of_topology import list_of  # here: they import the compiler
-    from flexclear.dynamics.routines.store import stored
+    from flexclear.dynamics.routines.store import stored_list
 
     of = rows, where
     if of not in code.running:
@@ -87,7 +89,7 @@ def call_list(
             given = model.parts, topology_of(model.arrays, with_selection(model, h, rows)), where
             with _making:
                 key, place = repr(given).encode(), where if where in (m.CALLS, m.RECORD_CALLS) else None
-                code.lists[of] = stored(key, lambda: list_of(*given), partial(progress, None), place)
+                code.lists[of] = stored_list(key, lambda: list_of(*given), partial(progress, None), place)
         code.running[of] = code.lists[of].instance(h)
     return code.running[of]
 
@@ -153,13 +155,15 @@ def code_address(
         key = (parts, topology, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
-                source = sources.batched(parts, topology, lanes)
+                source = sources.source_of_lanes(parts, topology, lanes)
             else:
                 source = (
-                    sources.tangent(parts, topology) if changes else sources.specialised(parts, topology, exact=exact)
+                    sources.source_of_tangents(parts, topology)
+                    if changes
+                    else sources.source_of_steps(parts, topology, exact=exact)
                 )
             try:
-                _known[key] = functions.specialised(SPECIALISED, source, partial(progress, None))
+                _known[key] = functions.address_of_specialised(SPECIALISED, source, partial(progress, None))
             except UnsuitedError:
                 if changes:
                     raise
