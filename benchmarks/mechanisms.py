@@ -37,8 +37,10 @@ class Mechanism:
     bundles: Mapping[str, xr.Dataset]
 
     def engine(self) -> Engine:
-        """Return the compiled engine of the scene."""
-        return engine_of(self.scene, self.bundles, silent)
+        """Return the compiled engine of the scene, whose steps use straight code as those of long runs do."""
+        engine = engine_of(self.scene, self.bundles, silent)
+        engine.specialised.worthwhile = True
+        return engine
 
     def general_engine(self) -> Engine:
         """Return the engine whose steps run a list of calls, as those of scenes too long for straight code do."""

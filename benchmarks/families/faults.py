@@ -30,7 +30,7 @@ from benchmarks.page import Columns, table
 from flexclear.artifacts import maintenance
 from flexclear.artifacts.disk import read_checked
 from flexclear.artifacts.store import Store, read_record
-from flexclear.dynamics.compile.files import CODE, compiled
+from flexclear.dynamics.compile.files import CODE, is_compiled
 from flexclear.workflow.journal import Journal
 
 SCENE = "checks/pendulum"
@@ -274,7 +274,11 @@ def _same(read: Callable[[Path], object], path: Path) -> Judge:
 def _kernel(path: Path) -> Judge:
     whole = read_checked(path.with_suffix(".sum"))
     return lambda: (
-        "detected" if not compiled(path) else "harmless" if read_checked(path.with_suffix(".sum")) == whole else "used"
+        "detected"
+        if not is_compiled(path)
+        else "harmless"
+        if read_checked(path.with_suffix(".sum")) == whole
+        else "used"
     )
 
 

@@ -172,7 +172,7 @@ def test_a_number_of_an_expression_compiles_nothing_anew() -> None:
     assert models[0].parts == models[1].parts
     assert not np.array_equal(models[0].arrays.f, models[1].arrays.f)
     assert np.array_equal(models[0].arrays.h, models[1].arrays.h)
-    assert repr(models[0].parts) in sources.specialised(models[0].parts, ())
+    assert repr(models[0].parts) in sources.source_of_steps(models[0].parts, ())
     assert tabulate(build(structure, {})).parts != models[0].parts
 
 

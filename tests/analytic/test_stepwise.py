@@ -12,6 +12,8 @@ from scipy.linalg import null_space
 
 import flexclear as fc
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.run import trajectory
+from flexclear.dynamics.run.evaluation import engine
 from flexclear.dynamics.run.progress_rate import Judge
 from tests.processes import python
 
@@ -70,7 +72,12 @@ def test_a_motion_in_steps_is_that_of_the_run(root: Path, name: str, pieces: int
         assert sim.read("dissipated") == pytest.approx(float(run.dissipated[-1]), abs=1e3 * allowed * energy)
 
 
-def test_a_restored_motion_with_impacts_repeats_to_the_last_bit(root: Path, tmp_path: Path):
+def test_a_restored_motion_with_impacts_repeats_to_the_last_bit(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Its steps use specialised code from some time on."""
+    monkeypatch.setattr(trajectory, "SLICE", 100)
+    monkeypatch.setattr(engine, "LONG", 500)
     scene, duration = check(root, "clearance_slider_crank"), 7e-4
 
     def follow(sim: Any) -> list[bytes]:
@@ -91,10 +98,14 @@ def test_a_restored_motion_with_impacts_repeats_to_the_last_bit(root: Path, tmp_
         sim.state = here
         assert sim.time == 5 * duration
         assert follow(sim) == first
+        assert sim._engine.specialised.worthwhile
     (tmp_path / "here").write_bytes(here)
     program = f"""
 import flexclear as fc
+from flexclear.dynamics.run import trajectory
+from flexclear.dynamics.run.evaluation import engine
 from pathlib import Path
+trajectory.SLICE, engine.LONG = 100, 500
 with fc.simulation(fc.load_scene({str(scene.path)!r})) as sim:
     sim.state = Path("here").read_bytes()
     for _ in range(12):

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from flexclear.dynamics.compile import functions
-from flexclear.dynamics.compile.sources import sources, specialised
+from flexclear.dynamics.compile.sources import source_of_steps, sources_of_functions
 from flexclear.dynamics.contact import form as contact_forms
 from flexclear.dynamics.effects import CHAIN, FORMS, WHOLE, Parts, Scheme, most_parts, scheme_of
 from flexclear.dynamics.joints import JOINTS
@@ -112,7 +112,7 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
 @pytest.mark.parametrize("case", CASES)
 def test_the_entry_names_the_effects_present_and_no_other(case: str) -> None:
     found, present = CASES[case]
-    source = "".join(sources(found, SCHEME).values())
+    source = "".join(sources_of_functions(found, SCHEME).values())
     if "closures" in present:  # loops alone have singular poses
         present = present | {"singular poses"}
     for effect, word in EFFECTS.items():
@@ -168,7 +168,7 @@ def test_only_scenes_whose_joints_make_loops_have_closures() -> None:
 
 
 def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
-    return {name: functions.digest(text) for name, text in sources(found, scheme).items()}
+    return {name: functions.digest(text) for name, text in sources_of_functions(found, scheme).items()}
 
 
 def digest(scene: Scene) -> str:
@@ -178,7 +178,7 @@ def digest(scene: Scene) -> str:
 def specialised_code(scene: Scene) -> str:
     """Made for the topology of a mechanism."""
     model = tabulate(build(scene, bundles(scene)))
-    return specialised(model.parts, topology_of(model.arrays, model.arrays.h))
+    return source_of_steps(model.parts, topology_of(model.arrays, model.arrays.h))
 
 
 #: one number of every kind that a scene has

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from flexclear.dynamics.compile import calls
-from flexclear.dynamics.compile.sources import sources
+from flexclear.dynamics.compile.sources import sources_of_functions
 from flexclear.dynamics.effects import Parts, Scheme, scheme_of
 from flexclear.dynamics.integrate import METHODS
 from flexclear.dynamics.integrate.method import keep_nothing
@@ -20,7 +20,7 @@ PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",
 
 def composed(scheme: Scheme) -> str:
     """Generated source of steps."""
-    return sources(PARTS, scheme)["advance"]
+    return sources_of_functions(PARTS, scheme)["advance"]
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -260,7 +260,7 @@ def known_accelerations(found: Evaluated) -> np.ndarray:
     laws = m.named(m.LAW, w[h[m.LAW.at] :][: m.LAW.size * arrays.size(m.N_LAWS)])
     changed = m.named(m.LAW, change[h[m.LAW.at] :][: m.LAW.size * arrays.size(m.N_LAWS)])
     changed["value"], changed["rate"] = laws["rate"], laws["second_rate"]
-    numbers = np.array(dual.seeded(w.astype(float), change[None, :]), dtype=object)
+    numbers = np.array(dual.seed_changes(w.astype(float), change[None, :]), dtype=object)
     calls = Numbers(h, arrays.f, numbers, n, y, dy)
     list_of(model.parts, topology_of(arrays, h), m.CALLS, calls)
     opening = numbers[h[m.RESIDUAL_RATE] :][: arrays.size(m.N_CLOSURE_ROWS)]

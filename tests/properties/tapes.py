@@ -10,7 +10,7 @@ import numpy as np
 
 from flexclear.dynamics.specialise.code import Program
 from flexclear.dynamics.specialise.tape import Branch, Loop, Symbol
-from flexclear.dynamics.specialise.topology import RATES, RATES_CHANGE, STATE, STATE_CHANGE, split
+from flexclear.dynamics.specialise.topology import RATES, RATES_CHANGE, STATE, STATE_CHANGE, stretch_and_offset
 
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
@@ -77,7 +77,7 @@ def run(
     places = {STATE: y, RATES: dy, STATE_CHANGE: changes[0], RATES_CHANGE: changes[1], -1: 0}
 
     def where(place: int) -> int:
-        stretch, inside = split(place)
+        stretch, inside = stretch_and_offset(place)
         return inside + places.get(stretch, int(h[stretch]) if 0 <= stretch < len(h) else 0)
 
     values: dict[Symbol, Any] = {}

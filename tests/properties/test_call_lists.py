@@ -19,7 +19,7 @@ from flexclear.dynamics.routines import store
 from flexclear.dynamics.routines.calls import RESULTS, SCENE, CallList, Cell, cells, routine
 from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.routines.store import load
-from flexclear.dynamics.specialise.dual import seeded
+from flexclear.dynamics.specialise.dual import seed_changes
 from flexclear.dynamics.specialise.symbols import UndecidableError, branch, larger, smaller
 from flexclear.dynamics.specialise.topology import topology_of
 from flexclear.scene.schema import Scene
@@ -79,7 +79,7 @@ def test_products_with_sparse_matrices_are_those_of_full_ones() -> None:
     changes = random.normal(size=(2, n))
     h, w, n_ = np.zeros(m.HEADER, dtype=np.int64), np.zeros(1), np.zeros(m.INTEGERS, dtype=np.int64)
     on_numbers = Numbers(h, f, w, n_, 0, 0)
-    moved = on_numbers.products(Cell(SCENE, 1), 2, entries, [seeded(x[0], changes), vectors[1]], len(full))
+    moved = on_numbers.products(Cell(SCENE, 1), 2, entries, [seed_changes(x[0], changes), vectors[1]], len(full))
     assert [one.value for one in moved[0]] == pytest.approx(full @ x[0])
     assert np.array([one.change for one in moved[0]]) == pytest.approx(full @ changes.T)
     assert moved[1] == pytest.approx(full @ x[1])
@@ -186,7 +186,7 @@ def test_a_list_is_built_once_and_again_when_damaged(folder: Path, monkeypatch: 
         """Lists built so far, after a new process has asked for one."""
         for module in (functions, store):
             monkeypatch.setattr(module, "loaded", {})
-        found = store.stored(topology, build, silent_text)
+        found = store.stored_list(topology, build, silent_text)
         assert (len(found.codes), len(found.offsets), found.size) == (1, 2, 4)
         return len(built)
 

@@ -66,7 +66,7 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int) -> list[np.ndarr
     assert np.allclose(exact["w"][dy : dy + model.ny], moved["w"][dy : dy + model.ny].real, rtol=1e-9, atol=1e-9)
     touch = slice(h[m.TOUCH.at], h[m.TOUCH.at] + m.TOUCH.size * len(model.contacts))
     dw[y : y + model.ny] = direction
-    numbers, given = (np.array(dual.seeded(a, da[None, :]), dtype=object) for a, da in ((w, dw), (f, df)))
+    numbers, given = (np.array(dual.seed_changes(a, da[None, :]), dtype=object) for a, da in ((w, dw), (f, df)))
     list_of(model.parts, topology_of(model.arrays, h), m.CALLS, Numbers(h, given, numbers, n, y, dy))
     ways = [
         (moved["w"][dy : dy + model.ny].imag / STEP, moved["w"][touch].imag / STEP),

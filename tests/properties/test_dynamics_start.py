@@ -15,7 +15,7 @@ from flexclear.dynamics.model.mechanism import Mechanism, build
 from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.run.coordinates import joint_coordinates
-from flexclear.dynamics.run.evaluation.engine import prepare, uncompiled
+from flexclear.dynamics.run.evaluation.engine import engine_in_python, prepare
 from flexclear.dynamics.run.evaluation.observation import observe, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
@@ -262,7 +262,7 @@ def test_a_mended_start_is_in_the_runs_warnings_and_velocities_follow_the_mend()
 def test_without_a_compiler_a_start_has_the_same_state_and_outputs(name: str) -> None:
     model = tabulate(build(load_scene(f"scenes/checks/{name}.toml"), {}))
     seen = list[Observed]()
-    for engine in (prepare(model, silent), uncompiled(model, analyse(model))):
+    for engine in (prepare(model, silent), engine_in_python(model, analyse(model))):
         y = consistent_start(engine)
         seen.append(observe(engine, rows_of(engine, y[None], engine.start), after=True))
     # both evaluate the same sums, in another order

@@ -16,7 +16,7 @@ from flexclear.dynamics.model import selection
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.mobility import analyse
 from flexclear.dynamics.model.model import Model, tabulate
-from flexclear.dynamics.run.evaluation.engine import uncompiled
+from flexclear.dynamics.run.evaluation.engine import engine_in_python
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE
@@ -110,7 +110,7 @@ class Looks:
 
     def __init__(self, found: Evaluated) -> None:
         self.found, self.model, self.h = found, found.model, found.h
-        self._describe = uncompiled(self.model, analyse(self.model)).entry.kernels.evaluate  # type: ignore[attr-defined]
+        self._describe = engine_in_python(self.model, analyse(self.model)).entry.kernels.evaluate  # type: ignore[attr-defined]
         y = int(self.h[m.Y])
         self.state = found.w[y : y + self.model.ny].astype(float)
         self.here = self.at(0.0, np.zeros_like(self.state))

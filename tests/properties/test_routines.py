@@ -337,10 +337,11 @@ def inertia_parts(random: np.random.Generator) -> tuple[Symmetric, Matrix, Symme
 
 # Steps ----------------------------------------------------------------------------------------------------------------
 #: ways of steps, and what makes the engine take them
-WAYS: dict[str, tuple[str, Any]] = {
-    "list": ("address", lambda *given, **more: 0),
-    "list of a fifth selection": ("SELECTIONS", 0),
-    "straight code": ("SELECTIONS", 4),
+WAYS: dict[str, dict[str, Any]] = {
+    "list of a short run": {},
+    "list where straight code would be too long": {"LONG": 0, "address_for_rows": lambda *given, **more: 0},
+    "list of a fifth selection": {"LONG": 0, "SELECTIONS": 0},
+    "straight code": {"LONG": 0},
 }
 
 
@@ -370,7 +371,8 @@ def by_ways(scene: Scene) -> dict[str, Trajectory]:
     engines, runs = {way: engine_of(scene, {}, silent) for way in WAYS}, {}
     for way, one in engines.items():
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(engine, *WAYS[way])
+            for name, value in WAYS[way].items():
+                patch.setattr(engine, name, value)
             runs[way] = integrate(one, consistent_start(one), silent)
         assert bool(one.h[m.CALLS]) == (way != "straight code")
         assert one.h[m.RATES] != one.h[m.EVALUATE]
@@ -384,7 +386,6 @@ def test_steps_of_long_mechanisms_run_on_routines() -> None:
 
 def test_a_list_belongs_to_the_rows_that_are_selected(monkeypatch: pytest.MonkeyPatch) -> None:
     """With rows that depend on others the same pose is singular."""
-    monkeypatch.setattr(engine, *WAYS["list"])
     one = engine_of(load_scene(TREE / "scenes/checks/four_bars_2.toml"), {}, silent)
     y, lists, reports = consistent_start(one), [], []
     kept = one.selected.copy()

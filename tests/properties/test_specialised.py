@@ -16,6 +16,7 @@ from flexclear.dynamics.mechanics.of_topology import program_of
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.run.evaluation import closure_rows, specialised_code
+from flexclear.dynamics.run.evaluation import engine as engines
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of
@@ -93,8 +94,9 @@ def engine(integrator: str = "dop853") -> Engine:
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that reads more of some evaluations than the rates
-def test_compiled_steps_evaluate_as_the_record_does(integrator: str) -> None:
+def test_compiled_steps_evaluate_as_the_record_does(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Straight code of the steps, and the list that stores all, at states of a stroke with impacts."""
+    monkeypatch.setattr(engines, "LONG", 0)
     one = engine(integrator)
     run = integrate(one, consistent_start(one), silent)
     assert one.h[m.RATES] != one.h[m.EVALUATE]
@@ -111,11 +113,12 @@ def test_compiled_steps_evaluate_as_the_record_does(integrator: str) -> None:
 
 def test_what_is_too_long_runs_a_list_and_is_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tracing, "LONGEST_STRAIGHT", 10)
+    monkeypatch.setattr(engines, "LONG", 0)
     monkeypatch.setattr(specialised_code, "_known", {})
     scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
     with monkeypatch.context() as patch, TemporaryDirectory() as folder:
         patch.setenv("FLEXCLEAR_KERNELS", folder)
-        patch.setattr(compiler_process, "requested", lambda: False)  # it would compile what this process refuses
+        patch.setattr(compiler_process, "is_useful", lambda: False)  # it would compile what this process refuses
         patch.setattr(files, "loaded", {})
         patch.setattr(functions, "loaded", files.loaded)
         one = engine_of(scene, {}, silent)
@@ -129,6 +132,7 @@ def test_what_is_too_long_runs_a_list_and_is_differentiated(monkeypatch: pytest.
 
 def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
     one = engine()
+    one.specialised.worthwhile = True
     one.settle(silent)
     straight, kept = int(one.h[m.RATES]), one.selected.copy()
     assert straight != one.h[m.EVALUATE]
@@ -160,7 +164,7 @@ def test_equal_topologies_give_equal_code(lanes: int) -> None:
 
 def test_friction_of_ideal_joints_is_in_what_steps_evaluate() -> None:
     parts = tabulate(build(load_scene(TREE / "scenes/checks/rubbing_slider_crank.toml"), {})).parts
-    assert "joint_friction" in sources.specialised(parts, ())
+    assert "joint_friction" in sources.source_of_steps(parts, ())
 
 
 def test_a_magnitude_is_never_below_zero_and_may_be_below_more() -> None:
@@ -198,7 +202,7 @@ def test_lanes_of_a_loop_turn_as_often_as_each_alone(lanes: int) -> None:
     where = lambda array, index, lane: builder.gep(function.args[0], [INT(3 * lane + index)])  # noqa: E731
     Emitter(builder, made, where, lanes, exact=True).emit()
     builder.ret_void()
-    code = machine_code.load(machine_code.stored("f", *machine_code.assembled(str(builder.module))))
+    code = machine_code.load(machine_code.image_of_module("f", *machine_code.assemble(str(builder.module))))
     for k in range(0, len(states), lanes):
         CFUNCTYPE(None, c_void_p)(code.address)(states[k:].ctypes.data)
     assert states[:, 0] == pytest.approx(np.sqrt(states[:, 1]), rel=1e-15)

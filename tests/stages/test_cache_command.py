@@ -121,13 +121,13 @@ def test_kernels_that_another_process_removes_meanwhile_are_no_damage(
     source, sums = folder / "flexclear_old.py", folder / "flexclear_old.sum"
     source.write_text("")
     sums.write_bytes(encode_with_digest({}))
-    compiled = files.compiled
+    compiled = files.is_compiled
 
     def pruned(path: Path) -> bool:
         sums.unlink(missing_ok=True)
         return compiled(path)
 
-    monkeypatch.setattr(files, "compiled", pruned)
+    monkeypatch.setattr(files, "is_compiled", pruned)
     monkeypatch.setattr(files, "stored_by_another_build", lambda path: False)
     assert "0 faults" in command("cache", "check").out
 

@@ -17,7 +17,7 @@ import pytest
 from flexclear.artifacts.paths import kernel_root
 from flexclear.artifacts.store import Store
 from flexclear.dynamics.compile import compiler_process, folder, functions
-from flexclear.dynamics.compile.files import compiled, file_lock, load_file, load_files, loaded
+from flexclear.dynamics.compile.files import file_lock, is_compiled, load_file, load_files, loaded
 from flexclear.workflow import cores, schedule
 from flexclear.workflow.fingerprint import Sources
 from flexclear.workflow.progress import Monitor
@@ -80,7 +80,7 @@ def test_a_second_process_leaves_the_code_on_disk(files: list[Path]) -> None:
     with compiler_process.second_process(files) as process:
         assert process is not None
         assert process.wait(timeout=PATIENCE) == 0
-        assert all(compiled(path) for path in files)
+        assert all(is_compiled(path) for path in files)
         load_files(files, nothing)
     assert results(files) == [10, 11, 12]
 
@@ -137,7 +137,7 @@ def test_one_file_one_core_or_no_process_to_be_had_need_no_second_process(
         with compiler_process.second_process(files) as process:
             assert process is None
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    assert not compiler_process.requested()
+    assert not compiler_process.is_useful()
 
 
 def test_an_interrupt_ends_the_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -173,12 +173,12 @@ def test_there_is_one_second_process_for_a_folder(files: list[Path], monkeypatch
 def test_workers_have_no_second_process() -> None:
     """Each core has a worker already, unless theirs is the only task that can run."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert not pool.submit(compiler_process.requested).result()
-    assert compiler_process.requested()
+        assert not pool.submit(compiler_process.is_useful).result()
+    assert compiler_process.is_useful()
     cores.set_idle(others_idle=False)
-    assert not compiler_process.requested()
+    assert not compiler_process.is_useful()
     cores.set_idle(others_idle=True)
-    assert compiler_process.requested()
+    assert compiler_process.is_useful()
 
 
 @pytest.mark.parametrize("scenes, idle", [(["tiny/stays"], True), (["tiny/stays", "tiny/contact"], False)])

@@ -19,6 +19,7 @@ from flexclear.artifacts.store import Store
 from flexclear.dynamics import analyses
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.run import pieces, trajectory
+from flexclear.dynamics.run.evaluation import engine as engines
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.post.overview import comparison
 from flexclear.post.single_run.series import derive
@@ -42,8 +43,9 @@ class KilledError(BaseException):
 
 @pytest.fixture
 def often(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work is looked at often, and its state is written each time."""
+    """Work is looked at often, and its state is written each time; soon it is so long that its code is specialised."""
     monkeypatch.setattr(trajectory, "SLICE", SLICE)
+    monkeypatch.setattr(engines, "LONG", 5 * SLICE)
     monkeypatch.setattr(journal, "WRITING_INTERVAL", -1.0)
     monkeypatch.setattr(journal, "WRITING_FRACTION", np.inf)
     monkeypatch.setattr(os, "fsync", lambda file: None)  # a busy disk takes its time

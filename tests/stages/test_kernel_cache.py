@@ -11,7 +11,7 @@ from flexclear.artifacts.disk import encode_with_digest, publish
 from flexclear.artifacts.paths import kernel_root, results_root
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import files, folder, machine_code
-from flexclear.dynamics.compile.files import compiled, file_lock, load_files, loaded
+from flexclear.dynamics.compile.files import file_lock, is_compiled, load_files, loaded
 from flexclear.dynamics.routines import calls, store
 from flexclear.system.errors import InputError
 
@@ -43,7 +43,7 @@ def used(path: Path) -> bool:
     load_files([path], reported.append)
     scaled = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(loaded[path.stem].address)
     assert scaled(2.0) == 2.0 * 0.123456789
-    assert compiled(path)
+    assert is_compiled(path)
     return bool(reported)
 
 
@@ -67,7 +67,7 @@ def test_every_flipped_bit_and_every_cut_is_detected_before_anything_is_loaded(k
             place = (2 * k + 1) * len(whole) // 6
             broken = [whole[:place] + bytes([whole[place] ^ 1 << k]) + whole[place + 1 :], whole[:place], b""]
             part.write_bytes(broken[k] if k else broken[0])
-            assert not compiled(kernel)
+            assert not is_compiled(kernel)
             assert used(kernel)
             assert not used(kernel)
 
@@ -84,7 +84,7 @@ def test_what_cannot_be_loaded_is_compiled_again(kernel: Path, content: bytes) -
     """Its digest is right: it was written so, by whatever mistake; or it was interrupted; or its source is another."""
     kernel.with_suffix(files.CODE).write_bytes(content)
     publish(kernel.with_suffix(".sum"), encode_with_digest(files._digests(kernel)))
-    assert compiled(kernel)
+    assert is_compiled(kernel)
     assert used(kernel)
     assert not used(kernel)
     kernel.with_suffix(".sum").unlink()  # it is written last
@@ -142,7 +142,7 @@ def test_what_nobody_uses_is_pruned(kernel: Path) -> None:
     os.utime(kernel.with_suffix(".sum"), (month, month))
     with file_lock(kernel, wait=True):
         assert folder.prune(kernel.parent, unused=86400.0) == 0
-    assert compiled(kernel)
+    assert is_compiled(kernel)
     assert not used(kernel)  # and that is noted
     assert folder.prune(kernel.parent, unused=86400.0) == 0
     assert folder.prune(kernel.parent, largest=1) == 1

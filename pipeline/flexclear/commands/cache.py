@@ -73,7 +73,7 @@ def _check(options: argparse.Namespace) -> None:
     # a kernel without a checksum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
     others = {path for path in kernels if files.stored_by_another_build(path)}
-    damaged = [path for path in kernels if path not in others and files.damaged(path)]
+    damaged = [path for path in kernels if path not in others and files.is_damaged(path)]
     in_results = maintenance.shown_faults(store, store.root)
     faults = [*inventory.damaged, *in_results, *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:LISTED_FAULTS]:

@@ -424,10 +424,10 @@ def _fill_in_recipes(whole: Scene, bodies: Mapping[str, Body]) -> Scene:
 def _mechanism(whole: Scene, bodies: Mapping[str, Body], bundles: Mapping[str, xr.Dataset] | None = None) -> Mechanism:
     """Return the mechanism of a scene where it starts; without bundles flexible bodies have no modes."""
     from flexclear.dynamics.model.mechanism import build
-    from flexclear.dynamics.run.run import placed
+    from flexclear.dynamics.run.run import scene_in_place
 
     whole = _fill_in_recipes(whole, bodies)
-    return build(placed(whole), bundles or {name: bodies[name].rigid for name in whole.flexible()})
+    return build(scene_in_place(whole), bundles or {name: bodies[name].rigid for name in whole.flexible()})
 
 
 def _free_motions(whole: Scene, bodies: Mapping[str, Body], findings: Findings) -> None:

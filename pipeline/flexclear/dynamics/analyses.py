@@ -64,7 +64,7 @@ def start_refusals(
     The start that the scene asks for, its velocities, paths and surfaces; then actuators, conditions of events and
     periods of sections.  model: at the start, or where the start of another mechanism is still to be found.
     """
-    from flexclear.dynamics.run.evaluation.engine import uncompiled
+    from flexclear.dynamics.run.evaluation.engine import engine_in_python
     from flexclear.dynamics.run.evaluation.start import consistent_start
     from flexclear.dynamics.run.evaluation.without_compiler import without_compiler
     from flexclear.dynamics.run.run import engine_of
@@ -78,7 +78,7 @@ def start_refusals(
 
     def start() -> None:
         with without_compiler():
-            engine = uncompiled(model, mobility) if at is None or afar else engine_of(scene, bundles, silent)
+            engine = engine_in_python(model, mobility) if at is None or afar else engine_of(scene, bundles, silent)
             found.extend([engine, consistent_start(engine)])
 
     if at == "equilibrium" and afar:

@@ -23,7 +23,7 @@ from flexclear.dynamics.record.dataset import variables_for
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.run import trajectory
 from flexclear.dynamics.run.evaluation import closure_rows
-from flexclear.dynamics.run.evaluation.engine import Engine, another
+from flexclear.dynamics.run.evaluation.engine import Engine, copy_of_engine
 from flexclear.dynamics.run.evaluation.observation import observe_with, rows_of
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.inputs import Inputs
@@ -109,7 +109,7 @@ class Simulation:
 
     def _use(self, engine: Engine) -> None:
         """Step with this engine; states are observed by another one, so that reading changes no bit of the motion."""
-        self._engine, self._watch = engine, another(engine)
+        self._engine, self._watch = engine, copy_of_engine(engine)
         self._seen: observation.Blocks | None = None
 
     def advance(self, duration: float) -> None:
@@ -284,6 +284,7 @@ class Simulation:
             parts.append(np.ascontiguousarray(array).tobytes())
         own = {"integrator": self._here().model.scene.solver.integrator, "begun": self._begun, "lost": self._lost}
         own["met"] = [rows.hex() for rows in self._engine.specialised.rows]
+        own["worthwhile"] = self._engine.specialised.worthwhile
         own |= {"targets": self.inputs.targets, "turns": self._turns, "arrays": described}
         body = self._key + json.dumps(own).encode() + b"\n" + b"".join(parts)
         return MARK + hashlib.sha256(body).digest() + body
@@ -322,7 +323,7 @@ class Simulation:
         engine = self._engine
         engine.model.arrays.rows(m.PIECES)[:] = arrays["laws"]
         self.inputs.model = engine.model
-        engine.specialised.rows[:] = map(bytes.fromhex, own["met"])
+        engine.specialised.rows[:], engine.specialised.worthwhile = map(bytes.fromhex, own["met"]), own["worthwhile"]
         remember(engine, arrays)
         self._tape = tape = trajectory.blank(engine, NO_OUTPUTS)
         tape.selections.append((self.time, engine.selected.copy()))

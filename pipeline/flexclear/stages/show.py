@@ -114,14 +114,14 @@ def start_in_file(scene: Scene) -> tuple[StartView, InputError | None]:
 def draw_start(scene: Scene) -> tuple[StartView, InputError | None]:
     """Return the start pose with its names, and the error that refuses it.  Raises InputError if none can be drawn."""
     from flexclear.dynamics.model.start_pose import start_pose
-    from flexclear.dynamics.run.run import placed
+    from flexclear.dynamics.run.run import scene_in_place
     from flexclear.post.render.mechanism import Looks
     from flexclear.post.render.start_view import Missing, start_view
 
     bodies = {name: _body(scene.body[name], Path(recipe)) for name, recipe in scene.recipes().items()}
     looks = rendering.params(scene, "motion", "pvd")
     filled = _with_numbers(scene, bodies, lone := _unplaced_bodies(scene))
-    pose = start_pose(filled, placed(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
+    pose = start_pose(filled, scene_in_place(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
     gaps = [Missing(gap.joint, gap.start, gap.end, gap.angle) for gap in pose.gaps]
     view = start_view(pose.data, bodies, gaps, Looks(bodies=looks.get("bodies", {}), **looks.get("view", {})))
     if lone:

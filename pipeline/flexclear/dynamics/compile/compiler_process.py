@@ -37,7 +37,7 @@ def second_process(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None
     """
     with ExitStack() as stack:
         process = None
-        if len(paths) > 1 and requested():
+        if len(paths) > 1 and is_useful():
             alone = stack.enter_context(file_lock(paths[0].with_name("compiler"), wait=False))
             process = _start(paths) if alone else None
         if process is not None:
@@ -46,7 +46,7 @@ def second_process(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None
         yield process
 
 
-def requested() -> bool:
+def is_useful() -> bool:
     """Return True when a second process is useful and can be started."""
     # a program packed into one file would start itself again
     startable = bool(sys.executable) and not getattr(sys, "frozen", False)

@@ -66,18 +66,18 @@ def load_file(path: Path, report: Report, *, wait: bool = False) -> bool:
     return mine
 
 
-def compiled(path: Path) -> bool:
+def is_compiled(path: Path) -> bool:
     """Return True when the code of a file is on disk and undamaged."""
     noted = read_checked(path.with_suffix(".sum"))
     return noted is not None and noted == _digests(path)
 
 
-def damaged(path: Path) -> bool:
+def is_damaged(path: Path) -> bool:
     """Return True when the stored code of a file differs from its digests, which no other process is changing."""
-    if compiled(path):
+    if is_compiled(path):
         return False
     with file_lock(path, wait=True):
-        return path.with_suffix(".sum").is_file() and not compiled(path)
+        return path.with_suffix(".sum").is_file() and not is_compiled(path)
 
 
 def remove_code(path: Path) -> None:
@@ -88,7 +88,7 @@ def remove_code(path: Path) -> None:
 
 def _load_stored(path: Path) -> bool:
     """Load a file whose code is on disk; return False when the code is missing or cannot be loaded."""
-    if not compiled(path):
+    if not is_compiled(path):
         return False
     try:
         # another thread may have loaded the same code and be running it
@@ -134,10 +134,10 @@ def compiles(compiler: Callable[[Callable], Any]) -> Callable[[Callable], int]:
 def assembles(name: str, function: str, code: Callable[[], str], level: int) -> None:
     """Load the function of a generated file from LLVM code; without code (UnsuitedError) the address is 0.
 
-    name: of the file.  code: returns the LLVM code.  level: as in `machine_code.assembled`.
+    name: of the file.  code: returns the LLVM code.  level: as in `machine_code.assemble`.
     """
     try:
-        image = machine_code.stored(function, *machine_code.assembled(code(), level, optimised=False))
+        image = machine_code.image_of_module(function, *machine_code.assemble(code(), level, optimised=False))
     except UnsuitedError:
         image = machine_code.NOTHING
     loaded[name] = replace(machine_code.load(image), image=image)

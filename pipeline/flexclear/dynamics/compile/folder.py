@@ -66,7 +66,7 @@ def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
     """Remove kernels unused for `unused` seconds, then the oldest beyond `largest` bytes; return their number."""
     remove_leftovers(folder)
     files = [*folder.glob("flexclear_*.py"), *folder.glob(f"flexclear_routine_*{CODE}")]
-    kernels = [(_used(path), path) for path in files]
+    kernels = [(_last_use(path), path) for path in files]
     total, removed = 0, 0
     for used, path in sorted(kernels, reverse=True):
         total += size(path)
@@ -80,7 +80,7 @@ def size(path: Path) -> int:
     return sum(file.stat().st_size for file in {path, path.with_suffix(CODE)} if file.is_file())
 
 
-def _used(path: Path) -> float:
+def _last_use(path: Path) -> float:
     """Return the time of a kernel's last use, or of its source while it is being compiled (no checksum yet)."""
     noted = path.with_suffix(".sum")
     return (noted if noted.is_file() else path).stat().st_mtime

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
@@ -25,7 +24,7 @@ from flexclear.artifacts.paths import kernel_root
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.compile import machine_code, sources
 from flexclear.dynamics.compile.compiler_process import second_process
-from flexclear.dynamics.compile.files import CODE, SIGNATURES, compiled, load_files, loaded
+from flexclear.dynamics.compile.files import CODE, SIGNATURES, is_compiled, load_files, loaded
 from flexclear.dynamics.compile.folder import prune, writable
 from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.effects import Parts, Scheme
@@ -59,22 +58,34 @@ def function(name: str, address: int) -> Callable:
     return made
 
 
-def place(array: np.ndarray, kind: type = np.float64) -> int:
+def address_of_entries(array: np.ndarray, kind: type = np.float64) -> int:
     """Return the address of an array's entries for C functions; raise TypeError for another type or memory layout."""
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"an array of {array.dtype}, {array.strides} bytes apart, instead of {kind.__name__} in a row")
     return array.ctypes.data
 
 
-def places(arrays: Arrays) -> tuple[int, ...]:
+def addresses_of_arrays(arrays: Arrays) -> tuple[int, ...]:
     """Return the addresses of h, f, w and n."""
     h, f, w, n = arrays
-    return place(h, np.int64), place(f), place(w), place(n, np.int64)
+    return (
+        address_of_entries(h, np.int64),
+        address_of_entries(f),
+        address_of_entries(w),
+        address_of_entries(n, np.int64),
+    )
 
 
 def record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[int, ...]:
     """Return the arguments of `advance` for output times, rows of the record and events."""
-    return place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape
+    return (
+        address_of_entries(outputs),
+        len(outputs),
+        address_of_entries(rows),
+        *rows.shape,
+        address_of_entries(events),
+        *events.shape,
+    )
 
 
 @dataclass(frozen=True)
@@ -93,37 +104,41 @@ class Entry:
 
     def observe(self, arrays: Arrays, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row; arrays: h, f, w and n."""
-        given = place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape, tolerance, place(out), len(out)
-        function("observe", self.addresses["observe"])(*places(arrays), *given)
+        given = (
+            address_of_entries(rows),
+            *rows.shape,
+            address_of_entries(pieces, np.int64),
+            *pieces.shape,
+            tolerance,
+            address_of_entries(out),
+            len(out),
+        )
+        function("observe", self.addresses["observe"])(*addresses_of_arrays(arrays), *given)
 
     def advance(self, arrays: Arrays, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget."""
-        function("advance", self.addresses["advance"])(*places(arrays), 0, -1, *record(outputs, rows, events))
+        function("advance", self.addresses["advance"])(
+            *addresses_of_arrays(arrays), 0, -1, *record(outputs, rows, events)
+        )
 
     def evaluate(self, arrays: Arrays, t: float, repeat: int) -> None:
         """Evaluate the state in Y at time t, so many times."""
-        function("advance", self.addresses["advance"])(*places(arrays), t, repeat, *record(*NO_RECORD))
+        function("advance", self.addresses["advance"])(*addresses_of_arrays(arrays), t, repeat, *record(*NO_RECORD))
 
     def evaluate_laws(self, arrays: Arrays, t: float) -> None:
         """Evaluate all laws at time t."""
-        function("prescribe", self.addresses["prescribe"])(*places(arrays), t)
+        function("prescribe", self.addresses["prescribe"])(*addresses_of_arrays(arrays), t)
 
 
-def entry(
-    parts: Parts, scheme: Scheme, report: Callable[[str], None], equations: Mapping[str, str] = MappingProxyType({})
-) -> Entry:
-    """Return the compiled functions for these parts; `report` receives a message for each function to compile.
-
-    equations: sources by name of specialised code.
-    """
+def entry(parts: Parts, scheme: Scheme, report: Callable[[str], None]) -> Entry:
+    """Return the compiled functions for these parts; `report` receives a message for each function to compile."""
     folder, began = writable(kernel_root(), report), time.monotonic()
-    texts = {**sources.sources(parts, scheme), **equations}
-    files = {name: _file(folder, name, source) for name, source in texts.items()}
+    files = {name: _file(folder, name, source) for name, source in sources.sources_of_functions(parts, scheme).items()}
     _load(folder, files, report, began)
     return Entry({name: loaded[path.stem].address for name, path in files.items()})
 
 
-def specialised(name: str, source: str, report: Callable[[str], None]) -> int:
+def address_of_specialised(name: str, source: str, report: Callable[[str], None]) -> int:
     """Return the address of specialised code for one topology; name and source: of `sources`; 0 when LLVM yields none.
 
     Raises UnsuitedError when code for several lanes, or with tangents, is impossible.
@@ -134,7 +149,7 @@ def specialised(name: str, source: str, report: Callable[[str], None]) -> int:
     return loaded[path.stem].address
 
 
-def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], None]) -> dict[str, int]:
+def addresses_of_texts(texts: Mapping[str, Callable[[], str]], report: Callable[[str], None]) -> dict[str, int]:
     """Return the addresses of functions given by LLVM code, by names that tell all that the code depends on.
 
     Each is called `routine` in its text, and stored in a file of its own, without a source.
@@ -147,7 +162,9 @@ def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], No
                 if not compiling:
                     compiling = True
                     report("compiling routines (first run of a mechanism of this kind only)")
-                image = machine_code.stored("routine", *machine_code.assembled(texts[name](), 2, optimised=False))
+                image = machine_code.image_of_module(
+                    "routine", *machine_code.assemble(texts[name](), 2, optimised=False)
+                )
                 publish(path, image)
                 loaded.setdefault(path.stem, machine_code.load(image))
         if compiling:
@@ -156,7 +173,7 @@ def assembled(texts: Mapping[str, Callable[[], str]], report: Callable[[str], No
 
 
 def stored_codes(names: Iterable[str]) -> dict[str, int] | None:
-    """Return the addresses of functions of `assembled` by their names; None when one is not on disk."""
+    """Return the addresses of functions of `addresses_of_texts` by their names; None when one is not on disk."""
     paths = _routines(names, lambda _: None)
     if not all(path.stem in loaded or _loads(path) for path in paths.values()):
         return None
@@ -183,7 +200,7 @@ def _load(folder: Path, files: Mapping[str, Path], report: Callable[[str], None]
     names = {path: name for name, path in files.items() if path.stem not in loaded}
     requested = sorted(names, key=lambda path: [*FUNCTIONS].index(names[path]))
     with disk_limits(folder):
-        missing = [path for path in requested if not compiled(path)]
+        missing = [path for path in requested if not is_compiled(path)]
         with second_process(missing[::-1]):
             load_files(requested, lambda path: _announce(report, FUNCTIONS[names[path]][0], began))
         if missing:

@@ -49,12 +49,12 @@ NOTHING = b"{}\n"
 def image(function: Any) -> bytes:
     """Return the code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
     if PLAIN:
-        return stored(function.native_name, *assembled(function.inspect_llvm()))
+        return image_of_module(function.native_name, *assemble(function.inspect_llvm()))
     library = function._library  # private attributes of Numba, as those in `dynamics.lowering`
-    return stored(function.native_name, library._final_module, bytes(library._get_compiled_object()))
+    return image_of_module(function.native_name, library._final_module, bytes(library._get_compiled_object()))
 
 
-def stored(name: str, module: Any, binary: bytes) -> bytes:
+def image_of_module(name: str, module: Any, binary: bytes) -> bytes:
     """Return the image of a function, given by its name, LLVM's module and its object file."""
     foreign = [used.name for used in (*module.functions, *module.global_variables) if used.is_declaration]
     facts = {
@@ -65,7 +65,7 @@ def stored(name: str, module: Any, binary: bytes) -> bytes:
     return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
 
 
-def assembled(code: str, level: int = 3, *, optimised: bool = True) -> tuple[Any, bytes]:
+def assemble(code: str, level: int = 3, *, optimised: bool = True) -> tuple[Any, bytes]:
     """Return LLVM's module of a text, and its object file for this processor.
 
     level: of optimisation for speed, 0 to 3.  optimised: True when the text is optimised already.
@@ -84,7 +84,7 @@ def assembled(code: str, level: int = 3, *, optimised: bool = True) -> tuple[Any
 
 
 def load(stored: bytes) -> Code:
-    """Return the function of an image from `stored`; raise ValueError where it cannot be loaded."""
+    """Return the function of an image from `image_of_module`; raise ValueError where it cannot be loaded."""
     import llvmlite.binding as llvm
 
     line, _, binary = stored.partition(b"\n")

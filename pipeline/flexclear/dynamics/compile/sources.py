@@ -71,7 +71,7 @@ class Composition:
         return "\n".join([f'"""Generated: {self.what}."""', *lines, "", *made])
 
 
-def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
+def sources_of_functions(parts: Parts, scheme: Scheme) -> dict[str, str]:
     """Return the sources by function name, without those of one topology, in an order where callees come first."""
     by_name = {"prescribe": _laws(parts).text(PRESCRIBE)}
     if parts.closures:
@@ -89,7 +89,7 @@ def _laws(parts: Parts) -> Composition:
     return file
 
 
-def specialised(parts: Parts, topology: Topology, *, exact: bool = False) -> str:
+def source_of_steps(parts: Parts, topology: Topology, *, exact: bool = False) -> str:
     """Return the source of steps' right-hand side of one topology; exact: with the same bits as in each of several
     lanes."""
     longest = "LONGEST" if exact else "LONGEST_STRAIGHT"
@@ -97,13 +97,13 @@ def specialised(parts: Parts, topology: Topology, *, exact: bool = False) -> str
     return _of_topology(parts, topology, STRAIGHT, used, longest, exact=exact)
 
 
-def batched(parts: Parts, topology: Topology, lanes: int) -> str:
+def source_of_lanes(parts: Parts, topology: Topology, lanes: int) -> str:
     """Return the source of the function that advances several steppers of one topology (`compile.lanes`)."""
     taken = [CALLS, (f"{DYNAMICS}.compile.lanes", "make_lanes"), BATCHED]
     return _of_topology(parts, topology, LANES, taken, "LONGEST", lanes=lanes)
 
 
-def tangent(parts: Parts, topology: Topology) -> str:
+def source_of_tangents(parts: Parts, topology: Topology) -> str:
     """Return the source of the right-hand side for one topology with its tangents."""
     taken, change = [CALLS, (f"{DYNAMICS}.fields", "data"), BATCHED, (PRESCRIBED, "make_law_changes")], ""
     if parts.harmonics:

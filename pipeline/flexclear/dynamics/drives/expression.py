@@ -54,7 +54,7 @@ def pieces(law: Expression, dimension: str) -> Pieces:
         course = fold(
             steps,
             lambda leaf: Course((span[0],), (Piece(0.0, (leaf[0],) if isinstance(leaf, tuple) else (0.0, 1.0)),)),
-            lambda operator, operands: _applied(operator, operands, span),
+            lambda operator, operands: _apply(operator, operands, span),
         )
     except ValueError as error:
         raise ValueError(f"'{law.value}': {error}") from None
@@ -64,18 +64,18 @@ def pieces(law: Expression, dimension: str) -> Pieces:
     return Pieces(tuple(moved), span)
 
 
-def _applied(operator: str, operands: list[Course], span: tuple[float, float]) -> Course:
+def _apply(operator: str, operands: list[Course], span: tuple[float, float]) -> Course:
     """Return the result of an operation, piece by piece."""
     if operator in ("max", "min"):
         a, b = operands
-        return _split(_each(_OPERATIONS["-"], a, b), *((a, b) if operator == "max" else (b, a)), span)
+        return _switch(_each(_OPERATIONS["-"], a, b), *((a, b) if operator == "max" else (b, a)), span)
     if operator in ("abs", "sign", "step"):
         one = operands[0]
         low = {"abs": _each(_OPERATIONS["minus"], one), "sign": _constant(-1.0, span), "step": _constant(0.0, span)}[
             operator
         ]
         high = one if operator == "abs" else _constant(1.0, span)
-        return _split(one, high, low, span)
+        return _switch(one, high, low, span)
     if operator in _OPERATIONS:
         return _each(_OPERATIONS[operator], *operands)
     return _each(lambda a: _function(operator, a), *operands)
@@ -90,7 +90,7 @@ def _constant(value: float, span: tuple[float, float]) -> Course:
     return Course((span[0],), (Piece(0.0, (value,)),))
 
 
-def _split(switch: Course, above: Course, below: Course, span: tuple[float, float]) -> Course:
+def _switch(switch: Course, above: Course, below: Course, span: tuple[float, float]) -> Course:
     """Return `above` where the switch is positive, else `below`."""
     starts: list[float] = []
     for start, end in pairwise((*switch.starts, span[1])):

@@ -17,7 +17,7 @@ from flexclear.dynamics.record.dataset import variables_for
 from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.dynamics.run.evaluation import closure_rows
-from flexclear.dynamics.run.evaluation.engine import Engine, another
+from flexclear.dynamics.run.evaluation.engine import Engine, copy_of_engine
 from flexclear.dynamics.run.evaluation.observation import observe_blocks
 from flexclear.dynamics.run.horizon.periods import handover
 from flexclear.dynamics.run.pieces import Moment
@@ -37,7 +37,7 @@ class Watch:
     """
 
     def __init__(self, engine: Engine, y: np.ndarray, conditions: Mapping[str, Quantity], known: Mapping[str, float]):
-        self._engine, self._conditions = another(engine), conditions
+        self._engine, self._conditions = copy_of_engine(engine), conditions
         self._rows = recording.empty_record(0, len(engine.model.contacts), engine.model.ny)
         self._seen: Blocks | None = None
         self._looked = 1
@@ -116,7 +116,7 @@ class Watch:
 
     def _between(self, row: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return rows at these times, integrated from a row."""
-        engine = another(self._engine)
+        engine = copy_of_engine(self._engine)
         first = recording.record(row, len(engine.model.contacts))
         modes, latched = first.modes[0], first.latched[0]
         watched, begun = np.zeros_like(engine.view(m.WATCH.at)), list[tuple[float, ...]]()

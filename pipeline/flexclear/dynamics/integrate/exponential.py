@@ -27,7 +27,7 @@ import numpy as np
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.integrate import modal_basis, phi_functions
 from flexclear.dynamics.integrate.method import AWAITS, LOST, MADE, Method, await_rates, slope, vector
-from flexclear.dynamics.integrate.modal_basis import count, lift, oscillation, read, turn, work_rate
+from flexclear.dynamics.integrate.modal_basis import count, lift, modal_values, oscillation, turn, work_rate
 from flexclear.dynamics.integrate.newton import limit
 from flexclear.dynamics.integrate.norms import scaled_norm, set_error_scales
 from flexclear.dynamics.kernels import kernel
@@ -154,7 +154,7 @@ def advance_to(d, step, theta, j, out):
 def depart(d, step, e):
     """Compute the departure of g at node e from its start, from the node's state in Y_STAGE, slope and pair TOTAL."""
     departure, node = vector(d, DEPARTURE + e), slope(d, NODE)
-    read(d, d.at_y_stage, SPARE)
+    modal_values(d, d.at_y_stage, SPARE)
     for i in range(count(d)):
         start, now = oscillation(d, OF_STATE, i), oscillation(d, SPARE, i)
         now.z, now.rate = start.z - now.z, start.rate - now.rate
@@ -163,7 +163,7 @@ def depart(d, step, e):
         d.w[departure + c] = d.w[node + c] - d.slopes[c]
     lift(d, SPARE, C[e] * step, departure)
     d.w[departure + d.nq + d.nv + m.DRIVE_WORK] -= work_rate(d, TOTAL)
-    read(d, departure, e)
+    modal_values(d, departure, e)
 
 
 @kernel
@@ -179,7 +179,7 @@ def predict(d, step):
             rise += ((CUBIC[2, b] * x + CUBIC[1, b]) * x + CUBIC[0, b]) * x
             for c in range(d.ny):
                 d.w[departure + c] += rise * d.w[before + c]
-        read(d, departure, e)
+        modal_values(d, departure, e)
 
 
 @kernel
@@ -243,8 +243,8 @@ def make_kernels(evaluate: Callable, lists: Any) -> tuple:
             find_phi(d, THIRD, step, 1.0)
             find_phi(d, FOURTH, step, 1.0)
             d.memory[PHI_STEP] = step
-        read(d, d.at_slopes, OF_SLOPE)
-        read(d, d.at_y, OF_STATE)
+        modal_values(d, d.at_slopes, OF_SLOPE)
+        modal_values(d, d.at_y, OF_STATE)
 
     @kernel
     def visit(d, step, e):

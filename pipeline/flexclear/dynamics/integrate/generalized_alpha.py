@@ -249,7 +249,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
                 d.w[vector(d, NEW) + i] += d.w[left + i]
             norm = rates_norm(d, step, left)
             rate = norm / last_norm if k > 0 else 0.0
-            verdict = newton.converged(k, norm, last_norm, d.rtol)
+            verdict = newton.convergence(k, norm, last_norm, d.rtol)
             if verdict > 0:
                 return rate
             if verdict < 0 and (d.fixed == 0.0 or not norm <= 1e300):

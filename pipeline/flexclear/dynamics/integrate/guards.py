@@ -41,7 +41,7 @@ def length(v):
 
 
 @kernel
-def watched(d, g):
+def watched_vector(d, g):
     """Return the vector that guard g watches, in the state evaluated last, padded with zeros."""
     guard = d.guards[g]
     o = d.h[guard.table] + guard.offset
@@ -52,14 +52,14 @@ def watched(d, g):
 def note_start(d):
     """Store the watched vectors at the start of a segment."""
     for g in range(d.n_guards):
-        d.guarded[g].start = watched(d, g)
+        d.guarded[g].start = watched_vector(d, g)
 
 
 @kernel
 def note_end(d):
     """Store the watched vectors at the end of a step."""
     for g in range(d.n_guards):
-        d.guarded[g].end = watched(d, g)
+        d.guarded[g].end = watched_vector(d, g)
 
 
 @kernel
@@ -72,7 +72,7 @@ def accept(d):
 @kernel
 def beyond(d, g):
     """Return how far the vector of guard g is beyond its level; for a reversal, its component along its change."""
-    level, v = d.guard_numbers[g].level, watched(d, g)
+    level, v = d.guard_numbers[g].level, watched_vector(d, g)
     if level > 0.0:
         return length(v) - level
     way = sub(d.guarded[g].end, d.guarded[g].start)

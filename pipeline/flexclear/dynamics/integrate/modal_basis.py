@@ -58,7 +58,7 @@ def count(d):
 
 # Functions of the state -----------------------------------------------------------------------------------------------
 @kernel
-def read(d, state, p):
+def modal_values(d, state, p):
     """Apply C: fill pair p from the variables in w from index `state` on."""
     for i in range(count(d)):
         e, z, rate = d.nv * i, 0.0, 0.0

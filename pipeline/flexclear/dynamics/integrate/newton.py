@@ -26,7 +26,7 @@ def limit(rtol):
 
 
 @kernel
-def converged(k, norm, last_norm, rtol):
+def convergence(k, norm, last_norm, rtol):
     """Return 1 when correction k (norm in units of the tolerance) was the last one, -1 on divergence, else 0."""
     enough = limit(rtol)
     if not norm <= 1e300:

@@ -229,7 +229,7 @@ def make_kernels(evaluate: Callable, lists: object) -> tuple:
             newton.lu_solve_complex(d.w, matrix(d, COMPLEX), pivots, size, rest)
             norm = correct(d)
             rate = norm / last_norm if k > 0 else 0.0
-            verdict = newton.converged(k, norm, last_norm, d.rtol)
+            verdict = newton.convergence(k, norm, last_norm, d.rtol)
             if verdict != 0:
                 return rate if verdict > 0 else -1.0
             last_norm = norm

@@ -46,7 +46,7 @@ def note(d):
 
 
 @kernel
-def left(d):
+def least_independence(d):
     """Return the least ratio of a row's stored independence to its largest so far."""
     least = 1.0
     for r in range(d.n_kept_rows):
@@ -57,12 +57,12 @@ def left(d):
 
 
 @kernel
-def stand(d, t):
+def keep_independence(d, t):
     """Make the independence stored at time t that of the next step's start."""
     for r in range(d.n_kept_rows):
         row = d.independence[r]
         row.past, row.most = row.now, max(row.most, row.now)
-    d.past_time, d.left = t, left(d)
+    d.past_time, d.left = t, least_independence(d)
 
 
 @kernel
@@ -104,8 +104,11 @@ def make_foresee(evaluate: Callable) -> Callable:
         """
         span = t - d.past_time
         which, rough = soonest(d, span)
-        value, before = d.independence[max(which, 0)].now, d.independence[max(which, 0)].past  # `stand` moves them
-        stand(d, t)
+        value, before = (
+            d.independence[max(which, 0)].now,
+            d.independence[max(which, 0)].past,
+        )  # `keep_independence` moves them
+        keep_independence(d, t)
         blind = 0.0 < d.sigma < np.sqrt(BLIND)
         d.blind_steps = d.blind_steps + 1.0 if blind else 0.0
         if d.pass_time < t and d.most_reach == 0.0:
@@ -226,7 +229,7 @@ def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method
             d.evaluations += max(used, 0)
         if used >= 0:
             note(d)
-            d.left = left(d)
+            d.left = least_independence(d)
         else:
             attempt(d, step)
             d.evaluation, d.left = m.OK, 0.0

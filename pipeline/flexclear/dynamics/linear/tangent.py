@@ -167,10 +167,10 @@ def changed(
     engine.view(m.Y)[:] = y
     engine.evaluate_laws(bench.time)
     w, topology = list(engine.w), topology_of(model.arrays, h)
-    w[h[m.Y] : h[m.Y] + len(y)] = dual.seeded(y, directions)
+    w[h[m.Y] : h[m.Y] + len(y)] = dual.seed_changes(y, directions)
     if laws is not None:
         first = h[m.LAW.at]
-        w[first : first + laws.shape[1]] = dual.seeded(engine.w[first : first + laws.shape[1]], laws)
+        w[first : first + laws.shape[1]] = dual.seed_changes(engine.w[first : first + laws.shape[1]], laws)
     calls = Numbers(h, model.arrays.f, np.array(w, dtype=object), engine.n, int(h[m.Y]), int(h[m.SLOPES]))
     given = np.zeros(h[m.N_KEPT_ROWS]) if multipliers is None else multipliers
     store_holding_forces(mechanism_of(Tables(model.parts, topology)), list(given), calls)

@@ -16,7 +16,7 @@ from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
 from flexclear.dynamics.record.point import Runner
 from flexclear.dynamics.run.evaluation.engine import Engine
-from flexclear.dynamics.run.run import placed
+from flexclear.dynamics.run.run import scene_in_place
 from flexclear.scene.integrators import DEFAULT
 from flexclear.scene.load import edited
 from flexclear.scene.quantity import Quantity
@@ -130,7 +130,7 @@ class ScreeningRuns:
     @cached_property
     def extent(self) -> Extent:
         """Cost parameters of the full scene."""
-        model = tabulate(build(placed(self.scene), self.bundles))
+        model = tabulate(build(scene_in_place(self.scene), self.bundles))
         return Extent(model.mechanism.length, model.nq + model.nv)
 
     def affordable_part(self, dropped: Collection[Effect]) -> float:

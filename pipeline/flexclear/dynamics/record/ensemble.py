@@ -23,7 +23,7 @@ from flexclear.dynamics.record.motion import Motions, motion_series
 from flexclear.dynamics.run.evaluation import specialised_code
 from flexclear.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.dynamics.run.evaluation.closure_rows import select_rows
-from flexclear.dynamics.run.evaluation.engine import Engine, another
+from flexclear.dynamics.run.evaluation.engine import Engine, copy_of_engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.horizon.horizon import offset_jacobian, perturbed_start
 from flexclear.dynamics.run.ledger import require_closed, speeds_of_bodies
@@ -77,11 +77,11 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
     def heir(name: str) -> Engine:
         with making:
-            return another(other(name))
+            return copy_of_engine(other(name))
 
     def run_member(k: int, alive: Progress, place: Place | None) -> Member:
         """Run a member with an engine of its own, so that the result does not depend on previous members."""
-        mine = another(engine)
+        mine = copy_of_engine(engine)
         mine.specialised.place = place
         last, trajectory, switched = follow(mine, starts[k], alive, heir, judges and judges.run)
         return _member(last, trajectory, names) | {"switched": np.array(switched)}
@@ -116,7 +116,7 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 def places_of(engine: Engine, members: int, threads: int, progress: Progress) -> Places | None:
     """Return places for as many engines like this one, in so many threads; None where each is evaluated alone.
 
-    Copies of the engine by `another` evaluate with the same bits in both cases.
+    Copies of the engine by `copy_of_engine` evaluate with the same bits in both cases.
     """
     engine.specialised.exact, rows = True, engine.selected.tobytes()
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])

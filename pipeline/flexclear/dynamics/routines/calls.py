@@ -62,7 +62,7 @@ class Code(NamedTuple):
     @property
     def digest(self) -> bytes:
         """Digest of all that the machine code depends on."""
-        return hashlib.sha256(repr((self.runs, *_described(self.program))).encode()).digest()
+        return hashlib.sha256(repr((self.runs, *_describe(self.program))).encode()).digest()
 
 
 class _Kind(NamedTuple):
@@ -154,7 +154,7 @@ class CallList:
         targets = None if into is None else tuple(runs.at(cell) for cell in into)
         kind = (function, _shape(arguments), tuple(inside), targets, tuple(runs.arrays))
         if kind not in self._kinds:
-            self._kinds[kind] = _traced(function, arguments, inside, targets, tuple(runs.arrays))
+            self._kinds[kind] = _trace(function, arguments, inside, targets, tuple(runs.arrays))
         made, where = self._kinds[kind], tuple(runs.begins)
         known = self._known.get((id(made), where))
         if known is not None:
@@ -212,7 +212,7 @@ class CallList:
                     factors = [self.located(numbers[part], stride) for _, numbers in group]
                     places = [place for place, _ in group]
                     before = places if k else [[0.0] * len(sums)] * len(group)
-                    self.call(_increased, (part.stop - k, stride, before, factors, given), leaves(places))
+                    self.call(_add_products, (part.stop - k, stride, before, factors, given), leaves(places))
         return sums
 
     def repeat(self, turn: Callable[[Any], tuple[Any, Any]], state: Any) -> Any:
@@ -242,7 +242,7 @@ def _same(values: Any) -> Any:
     return (values,)
 
 
-def _increased(
+def _add_products(
     count: int,
     stride: int,
     sums: Sequence[Sequence[Any]],
@@ -250,16 +250,16 @@ def _increased(
     vectors: Sequence[Sequence[Any]],
 ) -> tuple[Any]:
     """Return sums, of each row for each vector, with the products of numbers; see `CallList.products`."""
-    entries = [[_located(vector, k, 1) for k in range(count)] for vector in vectors]
+    entries = [[_number_at(vector, k, 1) for k in range(count)] for vector in vectors]
     made = list[Any]()
     for before, row in zip(sums, rows, strict=True):
-        numbers = [_located(row, k, stride) for k in range(count)]
+        numbers = [_number_at(row, k, stride) for k in range(count)]
         for one, vector in zip(before, entries, strict=True):
             made.append(sum((a * x for a, x in zip(numbers, vector, strict=True)), one))
     return (made,)
 
 
-def _located(numbers: Sequence[Any], k: int, stride: int) -> Any:
+def _number_at(numbers: Sequence[Any], k: int, stride: int) -> Any:
     """Return a number that is located alone, or by the first one."""
     one = numbers[min(k, len(numbers) - 1)]
     return one[stride * k if len(numbers) == 1 else 0] if isinstance(one, Indexed) else one
@@ -309,7 +309,7 @@ class Argument(NamedTuple):
     offset: int
 
 
-def _traced(
+def _trace(
     function: Callable, arguments: Any, inside: list[Any], into: Sequence[Argument] | None, runs: tuple[str, ...]
 ) -> _Kind:
     """Trace a routine; inside: its numbers, symbolic ones by their run."""
@@ -324,7 +324,7 @@ def _traced(
     symbols = [read(one) for one in inside]
     with inline():
         result = function(*rebuilt(arguments, iter(symbols)))
-    first, rest = parted(result, into)
+    first, rest = separate_stored(result, into)
     stores = [(one.run, one.offset, value) for one, value in zip(into or (), leaves(first), strict=True)]
     given = {id(one): k for k, one in enumerate(symbols) if isinstance(one, Symbol)}
     places, slots = list[tuple[str, Any]](), dict[Symbol, int]()
@@ -340,7 +340,7 @@ def _traced(
     return _Kind(code, rest, places, len(slots))
 
 
-def parted(result: Any, into: Sequence[Any] | None) -> tuple[Any, Any]:
+def separate_stored(result: Any, into: Sequence[Any] | None) -> tuple[Any, Any]:
     """Return what is stored in given places, the first of several results, if there are such places, and the others."""
     if into is None:
         return (), result
@@ -354,7 +354,7 @@ def _shape(tree: Any) -> Any:
     return None
 
 
-def _described(program: Program) -> Iterator[Any]:
+def _describe(program: Program) -> Iterator[Any]:
     """Yield operations and stores of a program, with symbols by their order."""
     numbers: dict[Symbol, int] = {}
 

@@ -31,7 +31,7 @@ _EVALUATE = ir.FunctionType(
 
 def routine_text(code: Code) -> str:
     """Return the LLVM text of a traced routine."""
-    function, builder = _begun(_ROUTINE)
+    function, builder = _begin_function(_ROUTINE)
     arrays, offsets = dict(zip(ARRAYS, function.args, strict=False)), function.args[-1]
     begins = {}
     for k, array in enumerate(code.runs):
@@ -53,21 +53,28 @@ def routine_text(code: Code) -> str:
 
 def interpreter_text(place: int | None) -> str:
     """Return the LLVM text of the function that runs the list of calls at a place of h, or one that it is given."""
-    function, builder = _begun(_EVALUATE if place else ir.FunctionType(_WORD, [*_EVALUATE.args, _WORD]))
+    function, builder = _begin_function(_EVALUATE if place else ir.FunctionType(_WORD, [*_EVALUATE.args, _WORD]))
     h, f, w, n, t, y, dy, *given = function.args
     if place:
         laws = ir.FunctionType(_WORD, _EVALUATE.args[:5]).as_pointer()
-        builder.call(builder.inttoptr(_read(builder, h, m.PRESCRIBE), laws), [h, f, w, n, t])
-    head = builder.inttoptr(given[0] if given else _read(builder, h, place), _WORD.as_pointer())
-    count, codes, offsets, results = (_read(builder, head, k) for k in range(4))
+        builder.call(builder.inttoptr(_load_word(builder, h, m.PRESCRIBE), laws), [h, f, w, n, t])
+    head = builder.inttoptr(given[0] if given else _load_word(builder, h, place), _WORD.as_pointer())
+    count, codes, offsets, results = (_load_word(builder, head, k) for k in range(4))
     codes, offsets = (builder.inttoptr(one, _WORD.as_pointer()) for one in (codes, offsets))
     results = builder.inttoptr(results, _FLOAT.as_pointer())
-    arrays = [f, builder.gep(w, [y]), builder.gep(w, [dy]), w, results, builder.gep(n, [_read(builder, n, m.MODE)])]
+    arrays = [
+        f,
+        builder.gep(w, [y]),
+        builder.gep(w, [dy]),
+        w,
+        results,
+        builder.gep(n, [_load_word(builder, n, m.MODE)]),
+    ]
     before, loop, after = builder.block, builder.append_basic_block(), builder.append_basic_block()
     builder.branch(loop)
     builder.position_at_end(loop)
     k = builder.phi(_WORD)
-    code, where = (_read(builder, table, k) for table in (codes, offsets))
+    code, where = (_load_word(builder, table, k) for table in (codes, offsets))
     routine, where = builder.inttoptr(code, _ROUTINE.as_pointer()), builder.inttoptr(where, _OFFSET.as_pointer())
     following = builder.add(k, builder.call(routine, [*arrays, where]))
     k.add_incoming(_WORD(0), before)
@@ -82,10 +89,10 @@ def interpreter_text(place: int | None) -> str:
     return str(builder.module)
 
 
-def _begun(kind: ir.FunctionType) -> tuple[ir.Function, ir.IRBuilder]:
+def _begin_function(kind: ir.FunctionType) -> tuple[ir.Function, ir.IRBuilder]:
     function = ir.Function(ir.Module(NAME), kind, NAME)
     return function, ir.IRBuilder(function.append_basic_block())
 
 
-def _read(builder: ir.IRBuilder, words: Any, index: Any) -> Any:
+def _load_word(builder: ir.IRBuilder, words: Any, index: Any) -> Any:
     return builder.load(builder.gep(words, [index if isinstance(index, ir.Value) else _WORD(index)]))

@@ -24,7 +24,7 @@ from flexclear.dynamics.routines.calls import (
     Cell,
     Span,
     inline,
-    parted,
+    separate_stored,
 )
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.specialise.dual import product
@@ -46,7 +46,7 @@ class Numbers(CallList):
         """Return the results of a call; without the first of several, if cells are given to store that."""
         given = [self._read(one) if type(one) in (Cell, Span) else one for one in leaves(arguments)]
         with inline():
-            first, rest = parted(function(*rebuilt(arguments, iter(given))), into)
+            first, rest = separate_stored(function(*rebuilt(arguments, iter(given))), into)
         for cell, value in zip(into or (), leaves(first), strict=True):
             self._arrays[cell.array][self._place(cell)] = value
         return rest
@@ -73,7 +73,7 @@ class Numbers(CallList):
         return Indexed(lambda index: array[first + index]) if isinstance(one, Span) else array[first]
 
     def _place(self, cell: Cell | Span) -> int:
-        stretch, inside = topologies.split(cell.index)
+        stretch, inside = topologies.stretch_and_offset(cell.index)
         return int(inside if stretch < 0 else self._h[stretch] + inside)
 
     @property

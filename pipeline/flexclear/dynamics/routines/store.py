@@ -66,7 +66,7 @@ class ListInstance:
 
     def __init__(self, loaded: LoadedList, h: np.ndarray) -> None:
         self.loaded, self.results = loaded, np.zeros(loaded.size)
-        stretch, inside = topologies.split(loaded.offsets)
+        stretch, inside = topologies.stretch_and_offset(loaded.offsets)
         self._offsets = (np.where(stretch >= 0, h[stretch], 0) + inside).astype(np.int32)
         self._starts = (self._offsets.ctypes.data + self._offsets.itemsize * loaded.begins).astype(np.int64)
         codes, starts, results = (table.ctypes.data for table in (loaded.codes, self._starts, self.results))
@@ -75,7 +75,7 @@ class ListInstance:
         self.words = np.array(words, dtype=np.int64)
 
 
-def stored(
+def stored_list(
     topology: bytes, build: Callable[[], CallList], report: Callable[[str], None], place: int | None = m.CALLS
 ) -> LoadedList:
     """Return the list of a topology, from disk or built; `report` receives a message before routines are compiled.
@@ -88,7 +88,7 @@ def stored(
         table = read_checked(path)
         at = functions.stored_codes(table["names"]) if table else None
         if table and at:
-            loaded[path] = _loaded(table, at)
+            loaded[path] = _list_of_table(table, at)
         else:
             calls = build()
             loaded[path] = load(calls, report, place)
@@ -98,10 +98,10 @@ def stored(
 
 
 def load(calls: CallList, report: Callable[[str], None], place: int | None = m.CALLS) -> LoadedList:
-    """Return a list ready to run; the arguments are those of `stored`."""
+    """Return a list ready to run; the arguments are those of `stored_list`."""
     table = _table(calls, place)
     texts = [partial(interpreter_text, place), *(partial(routine_text, code) for code in calls.codes)]
-    return _loaded(table, functions.assembled(dict(zip(table["names"], texts, strict=True)), report))
+    return _list_of_table(table, functions.addresses_of_texts(dict(zip(table["names"], texts, strict=True)), report))
 
 
 def _table(calls: CallList, place: int | None) -> dict[str, list]:
@@ -117,7 +117,7 @@ def _table(calls: CallList, place: int | None) -> dict[str, list]:
     }
 
 
-def _loaded(table: dict[str, list], at: dict[str, int]) -> LoadedList:
+def _list_of_table(table: dict[str, list], at: dict[str, int]) -> LoadedList:
     addresses = np.array([at[name] for name in table["names"]], dtype=np.int64)
     begins = np.cumsum([0, *table["counts"]])[:-1]
     offsets = np.array(table["offsets"], dtype=np.int64)

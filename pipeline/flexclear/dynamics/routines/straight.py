@@ -20,7 +20,7 @@ from flexclear.dynamics.routines.calls import (
     Cell,
     Span,
     inline,
-    parted,
+    separate_stored,
 )
 from flexclear.dynamics.specialise import symbols
 from flexclear.dynamics.specialise import topology as topologies
@@ -42,7 +42,7 @@ class OneTape(CallList):
         """Record a call and return its results; without the first of several, if cells are given to store that."""
         with inline():
             given = [self._loaded(one) if type(one) in (Cell, Span) else one for one in leaves(arguments)]
-            first, rest = parted(function(*rebuilt(arguments, iter(given))), into)
+            first, rest = separate_stored(function(*rebuilt(arguments, iter(given))), into)
         self._stored |= {cell.key: (cell, value) for cell, value in zip(into or (), leaves(first), strict=True)}
         return rest
 
@@ -62,7 +62,7 @@ class OneTape(CallList):
 
     def _loaded(self, cell: Cell | Span) -> Any:
         if isinstance(cell, Span):
-            array, first = _place(cell)
+            array, first = _array_and_index(cell)
             return Indexed(lambda index: self._tape.write(FLOAT, "load", array, first + index))
         if cell.key in self._stored:
             return self._stored[cell.key][1]
@@ -70,17 +70,17 @@ class OneTape(CallList):
             return 0.0
         if cell.array == MODES:
             return self._tape.write(INTEGER, "load", "n", self._tape.write(INTEGER, "load", "n", m.MODE) + cell.index)
-        return self._tape.write(FLOAT, "load", *_place(cell))
+        return self._tape.write(FLOAT, "load", *_array_and_index(cell))
 
     @property
     def program(self) -> Program:
         """The program of all calls."""
         kept = [one for one in self._stored.values() if one[0].array != RESULTS or one[0].index == 0]
-        stores = [(*_place(cell), value) for cell, value in kept]
+        stores = [(*_array_and_index(cell), value) for cell, value in kept]
         return Program(self._tape.block, [*stores, ("n", m.ABRIDGED, 1)])
 
 
-def _place(cell: Cell | Span) -> tuple[str, int]:
+def _array_and_index(cell: Cell | Span) -> tuple[str, int]:
     """Return array and index of a number."""
     if cell.array == RESULTS:
         return "n", m.EVALUATION

@@ -50,7 +50,9 @@ from flexclear.system.progress import Progress
 RANK_TOLERANCE = 1e-8
 
 
-def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, dict[str, Pieces]]:
+def scene_with_actuators(
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress
+) -> tuple[Scene, dict[str, Pieces]]:
     """Return the scene with driven actuators instead of driven paths, and the actuators' laws of motion.
 
     Raises InputError when the actuators cannot produce the motion, or could in more than one way.

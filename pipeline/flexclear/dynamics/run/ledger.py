@@ -115,7 +115,7 @@ def _tolerance(solver: Solver) -> float:
     return solver.ledger_tolerance or default_energy_error(solver)
 
 
-def _held(solver: Solver, kinetic: float, elastic: float) -> float:
+def _energy_of_held_states(solver: Solver, kinetic: float, elastic: float) -> float:
     """Return the energy that counts as exchanged at least [J], for states that elastic parts hold at rest.
 
     An error e of a state that stores E changes its forces and deflections by sqrt(e/E), which the tolerance resolves.
@@ -179,7 +179,7 @@ def balance(model: Model, seen: Observed, component: int | None = None) -> Balan
     # rest does work by the rounding of its positions
     # 1e-30: energies below this count as zero: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
     rounding = max(1e-12 * largest, 1e-14 * _largest_work(model, seen, component), 1e-30)
-    held = _held(model.scene.solver, *(float(np.abs(totals[n]).max()) for n in ("kinetic", "elastic")))
+    held = _energy_of_held_states(model.scene.solver, *(float(np.abs(totals[n]).max()) for n in ("kinetic", "elastic")))
     return Balance(of, totals, np.abs(totals["energy_error"]), max(exchanged, held), rounding)
 
 

@@ -65,7 +65,7 @@ class Judges(NamedTuple):
     trial: int = 0
 
 
-def look(engine: Engine) -> Look:
+def observe_progress(engine: Engine) -> Look:
     """Return the present progress of the run."""
     n = engine.n
     counts = (int(n[k]) for k in (m.EVALUATIONS, m.STEPS, m.STIFF_STEPS))

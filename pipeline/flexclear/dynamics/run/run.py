@@ -21,7 +21,7 @@ from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.model.plausibility import start_errors
 from flexclear.dynamics.model.refill import refill_model
 from flexclear.dynamics.run import trajectory as stepping
-from flexclear.dynamics.run.evaluation.engine import Engine, another, assemble, prepare
+from flexclear.dynamics.run.evaluation.engine import Engine, assemble, copy_of_engine, prepare
 from flexclear.dynamics.run.evaluation.observation import observe_blocks
 from flexclear.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.dynamics.run.horizon.horizon import Pair
@@ -81,7 +81,7 @@ def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     return prepare(tabulate(build(with_start_state(scene, bundles, progress)[0], bundles)), progress)
 
 
-def placed(scene: Scene) -> Scene:
+def scene_in_place(scene: Scene) -> Scene:
     """Return the scene with bodies positioned by joints and drives at the begin of the run, if it begins elsewhere."""
     if scene.start is None or scene.start.begins is None:
         return scene
@@ -96,9 +96,9 @@ def with_driven_actuators(
     """Return the scene whose actuators are driven so that they produce the given paths, and the actuators' laws."""
     if not any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
         return scene, {}
-    from flexclear.dynamics.run.inverse import actuated  # here, since it imports SciPy
+    from flexclear.dynamics.run.inverse import scene_with_actuators  # here, since it imports SciPy
 
-    return actuated(scene, bundles, progress)
+    return scene_with_actuators(scene, bundles, progress)
 
 
 def with_start_state(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
@@ -222,7 +222,7 @@ class RunInParts:
 
     def _observed(self, last: Engine, trajectory: Trajectory, switched: str) -> Run:
         over = bool(last.control[m.TIME] >= last.end)
-        engine = last if over else another(last)  # observation would disturb an engine that goes on
+        engine = last if over else copy_of_engine(last)  # observation would disturb an engine that goes on
         shown = trajectory if self._pair is None else trajectory.without(self._pair.added)
         run = Run(self._scene, engine, shown, observe_run(engine, shown), None, switched, self._mended)
         if not over and stopping.stop_reason():
@@ -383,5 +383,5 @@ def _near_singular(
         engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
         for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
-            if collocation.blurred(engine, rows[k]):
+            if collocation.is_blurred(engine, rows[k]):
                 yield k, motion

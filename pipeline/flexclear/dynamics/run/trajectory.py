@@ -18,7 +18,7 @@ from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import NO_IMPACT, overlap_depths
 from flexclear.dynamics.run.pieces import Handover, Jumps, Moment, Selections, Tape, by_time
-from flexclear.dynamics.run.progress_rate import Judge, crawls, look
+from flexclear.dynamics.run.progress_rate import Judge, crawls, observe_progress
 from flexclear.dynamics.run.refusals import refusal
 from flexclear.dynamics.run.refusals.reach import require_shallow
 from flexclear.dynamics.run.singular_poses import beginning, passing
@@ -205,7 +205,7 @@ def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 
 def begin(engine: Engine, y: np.ndarray, outputs: np.ndarray, progress: Progress) -> Tape:
     """Return a tape with its first row; begin contacts that are closed at the start; prepare a singular start."""
-    engine.specialised.rows.clear()
+    engine.specialised.begin()
     y = _sampler(engine)(y, engine.start)
     tape = _prepare(engine, y, engine.start, outputs)
     first = recording.record(tape.rows[:1], len(engine.model.contacts))
@@ -223,13 +223,13 @@ def _ready(engine: Engine, tape: Tape, progress: Progress) -> Tape:
     """Return the tape of an integration that is ready to step."""
     engine.n[m.FRESH] = 1
     engine.settle(progress)
-    tape.looks.append(look(engine))
+    tape.looks.append(observe_progress(engine))
     return tape
 
 
 def resume(engine: Engine, left: Handover, outputs: np.ndarray, progress: Progress) -> Tape:
     """Return a tape with another method's record, and set the engine to that method's last state."""
-    engine.specialised.rows.clear()
+    engine.specialised.begin()
     here, before = left.here, left.tape
     tape, n = _prepare(engine, here.y, left.time, outputs), engine.n
     cap = n[m.CAP]
@@ -342,7 +342,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
         else:
             if engine.model.contacts:
                 require_shallow(engine)
-            tape.looks.append(look(engine))
+            tape.looks.append(observe_progress(engine))
             if reason := judge.verdict(engine, tape.looks):
                 raise StiffError(f"at t = {t:.6g} s: {reason}", _hand_over(engine, tape))
             engine.settle(progress)

@@ -57,7 +57,7 @@ def batched(made: Callable[[], Program], lanes: int) -> tuple[Any, Any]:
             h, f, numbers, lane = values
             begins = dict[int, Any]()
             for k, index in enumerate(_numbers(traced())):
-                stretch, inside = topologies.split(index)
+                stretch, inside = topologies.stretch_and_offset(index)
                 if stretch not in begins:
                     begins[stretch] = builder.gep(f, [builder.load(builder.gep(h, [_INTEGER(stretch)]))])
                 value = builder.load(builder.gep(begins[stretch], [_INTEGER(inside)]))

@@ -94,14 +94,14 @@ def size(block: list[Any], counts: Counter[Symbol]) -> int:
     return total
 
 
-def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbol, Any]]:
+def fused_sums(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbol, Any]]:
     """Return, by sum, the product in it that has no other use, of the same block, and the other operand."""
     pairs, products = dict[Symbol, tuple[Symbol, Any]](), set[Symbol]()
     for item in block:
         if not isinstance(item, Symbol):
             for inner in item.blocks:
-                pairs |= fused(inner, counts)
-        elif item.operation == "mul" and counts[item] == 1 and divisor(item, counts) is None:
+                pairs |= fused_sums(inner, counts)
+        elif item.operation == "mul" and counts[item] == 1 and reciprocal_factor(item, counts) is None:
             products.add(item)
         elif counts[item] and item.operation in ("add", "sub"):
             a, b = item.arguments
@@ -112,7 +112,7 @@ def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbo
     return pairs
 
 
-def divisor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
+def reciprocal_factor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
     """Return the factor of a product that is a reciprocal without other uses, or None."""
     for factor in product.arguments:
         if isinstance(factor, Symbol) and factor.operation == "reciprocal" and counts[factor] == 1:
@@ -141,7 +141,7 @@ class Emitter:
         self.builder, self.program, self.where, self.lanes, self.number = builder, program, where, lanes, number
         self.uses = uses(program)
         self.exact, self.flags = exact, () if exact else FLAGS
-        self.fused = fused(program.block, self.uses) if exact else {}
+        self.fused = fused_sums(program.block, self.uses) if exact else {}
         self.inside_sums = {product for product, _ in self.fused.values()}
         self.types = {kind: one if lanes == 1 else ir.VectorType(one, lanes) for kind, one in TYPES.items()}
         self.values: dict[Symbol, Any] = {}
@@ -160,7 +160,7 @@ class Emitter:
         return ir.Constant(self.types[kind], value if self.lanes == 1 else [value] * self.lanes)
 
     def _place(self, index: Any, lane: int) -> Any:
-        if found := topologies.based(index):
+        if found := topologies.base_and_offset(index):
             return found[0], self._of(self.values[found[1]], lane)
         return self._of(self.values[index], lane) if isinstance(index, Symbol) else index
 
@@ -317,7 +317,7 @@ class Emitter:
 
     def _product(self, s: Symbol, values: list[Any]) -> Any:
         """Return a product, as a quotient where its reciprocal has no other use."""
-        inverse = divisor(s, self.uses)
+        inverse = reciprocal_factor(s, self.uses)
         if inverse is None:
             return self.builder.fmul(*values, flags=self.flags)
         other = s.arguments[1] if s.arguments[0] is inverse else s.arguments[0]

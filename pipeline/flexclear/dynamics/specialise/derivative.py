@@ -38,7 +38,7 @@ def tangent(program: Program, longest: int) -> Program:
     stores = [(array, forward.value(index), forward.value(value)) for array, index, value in program.stores]
     changes = list[tuple[str, Any, Any]]()
     for array, index, value in program.stores:
-        stretch, inside = topologies.split(index) if array == "w" else (-1, 0)
+        stretch, inside = topologies.stretch_and_offset(index) if array == "w" else (-1, 0)
         if stretch == topologies.RATES:
             changes.append(("w", topologies.start(topologies.RATES_CHANGE) + inside, forward.change(value)))
         elif stretch in STORED:
@@ -51,7 +51,7 @@ def _seed(tape: Tape, array: str, index: Any) -> Any:
     if array == "f":
         return tape.write(FLOAT, "load", "df", index)
     if array == "w" and not isinstance(index, Symbol):
-        stretch, inside = topologies.split(index)
+        stretch, inside = topologies.stretch_and_offset(index)
         if stretch == topologies.STATE:
             return tape.write(FLOAT, "load", "w", topologies.start(topologies.STATE_CHANGE) + inside)
         if stretch in GIVEN:

@@ -117,7 +117,7 @@ def _apply(name: str, function: Callable, *arguments: Any) -> Any:
     return Dual(result, change) if isinstance(change, np.ndarray) else result
 
 
-def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:
+def seed_changes(values: np.ndarray, changes: np.ndarray) -> list[Any]:
     """Return an array's numbers with their changes, shape (directions, len(values)); plain where all are zero."""
     moving = np.any(changes != 0.0, axis=0).tolist()
     return [Dual(v, changes[:, k].copy()) if moving[k] else v for k, v in enumerate(values)]

@@ -52,8 +52,10 @@ def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     """
     begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
     places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
-    places = [(array, found[0] if (found := topologies.based(index)) else index) for array, index in places]
-    stretches = sorted({(array, topologies.split(index)[0]) for array, index in places if isinstance(index, int)})
+    places = [(array, found[0] if (found := topologies.base_and_offset(index)) else index) for array, index in places]
+    stretches = sorted(
+        {(array, topologies.stretch_and_offset(index)[0]) for array, index in places if isinstance(index, int)}
+    )
     for lane, (h, f, w, n, *states) in enumerate(given):
         arrays.append({"h": h, "f": f, "w": w, "n": n})
         reported, changes = {-1: _INTEGER(0)}, states[2:]
@@ -70,11 +72,11 @@ def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
 
     def where(array: str, index: Any, lane: int) -> Any:
         if isinstance(index, tuple):
-            stretch, inside = topologies.split(index[0])
+            stretch, inside = topologies.stretch_and_offset(index[0])
             return builder.gep(begins[array, stretch, lane], [builder.add(index[1], _INTEGER(inside))])
         if not isinstance(index, int):
             return builder.gep(arrays[lane][array], [index])
-        stretch, inside = topologies.split(index)
+        stretch, inside = topologies.stretch_and_offset(index)
         return builder.gep(begins[array, stretch, lane], [_INTEGER(inside)])
 
     return where

@@ -153,7 +153,7 @@ class Tape:
             return self.subtract(a, b.arguments[0])
         if _negative(a):
             return self.subtract(b, a.arguments[0])
-        return self.write(FLOAT, "add", *_ordered(a, b))
+        return self.write(FLOAT, "add", *_in_order(a, b))
 
     def subtract(self, a: Any, b: Any) -> Any:
         """Return the difference."""
@@ -196,7 +196,7 @@ class Tape:
             return self.negate(self.multiply(a.arguments[0], b))
         if _negative(b):
             return self.negate(self.multiply(a, b.arguments[0]))
-        return self.write(FLOAT, "mul", *_ordered(a, b))
+        return self.write(FLOAT, "mul", *_in_order(a, b))
 
     def divide(self, a: Any, b: Any) -> Any:
         """Return the quotient, by a reciprocal that other quotients may reuse."""
@@ -252,7 +252,7 @@ def _negative(a: Any) -> bool:
     return isinstance(a, Symbol) and a.operation == "neg"
 
 
-def _ordered(a: Any, b: Any) -> tuple[Any, Any]:
+def _in_order(a: Any, b: Any) -> tuple[Any, Any]:
     return (a, b) if not isinstance(b, Symbol) or a.number <= b.number else (b, a)
 
 

@@ -39,7 +39,7 @@ def topology_of(arrays: Arrays, h: np.ndarray) -> Topology:
     return (tuple(sizes.tolist()), *tables)
 
 
-def split(index: Any) -> tuple[Any, Any]:
+def stretch_and_offset(index: Any) -> tuple[Any, Any]:
     """Return the header index of a work array, -1 for h, f, w or n itself, and the position in the array.
 
     index: an integer or an array of such.
@@ -52,7 +52,7 @@ def start(stretch: int) -> int:
     return (stretch + 1) << STRETCH
 
 
-def based(index: Any) -> tuple[int, Any] | None:
+def base_and_offset(index: Any) -> tuple[int, Any] | None:
     """Return the first entry of a work array, and the symbol that is added, for an index that is known when code runs.
 
     None for an index that is a number, or counts from the begin of h, f, w or n itself.

@@ -25,10 +25,9 @@ from flexclear.dynamics.run import bushings, joint_friction
 from flexclear.dynamics.run.evaluation import table_ranges
 from flexclear.dynamics.run.evaluation.specialised_code import (
     SpecialisedCode,
-    address,
+    address_for_rows,
     call_list,
     code_address,
-    equations,
 )
 from flexclear.dynamics.run.evaluation.without_compiler import IN_PYTHON, Uncompiled
 from flexclear.scene.loads import SampledPid
@@ -39,6 +38,8 @@ from flexclear.system.progress import Progress, silent
 EXPLANATIONS = {"bushings": bushings.explanation, "joint_friction": joint_friction.explanation}
 #: first selections of closure rows of an integration, whose steps are specialised; those of others run lists
 SELECTIONS = 4
+#: evaluations after which specialised code pays: it takes LLVM a second and saves up to a fifth of an evaluation
+LONG = 100_000
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ class Engine:
             calls = call_list(self.model, self.h, known, rows, progress, where)
             self.h[at], self.h[where] = calls.loaded.interpreter, calls.words.ctypes.data
         self.h[m.RATES], met = self.h[m.EVALUATE], rows in known.rows
-        if met and not (self._specialises(rows) and address(self.model, self.h, known, rows, progress)):
+        if met and not (self._specialises(rows) and address_for_rows(self.model, self.h, known, rows, progress)):
             calls = call_list(self.model, self.h, known, rows, progress)
             self.h[m.RATES], self.h[m.CALLS] = calls.loaded.interpreter, calls.words.ctypes.data
         elif met:
@@ -147,7 +148,9 @@ class Engine:
 
     def _specialises(self, rows: bytes) -> bool:
         """Return True when steps for closure rows that the integration has met use specialised code, if that exists."""
-        return bool(self.specialised.rows.index(rows) < SELECTIONS or self.h[m.N_CHANGES])
+        known = self.specialised
+        worthwhile = (known.exact or known.worthwhile) and known.rows.index(rows) < SELECTIONS
+        return bool(worthwhile or self.h[m.N_CHANGES])
 
     @property
     def _lists(self) -> dict[int, int]:
@@ -164,10 +167,11 @@ class Engine:
     def settle(self, progress: Progress) -> None:
         """Let further steps use specialised code or routines for the selected rows, at a place together with others.
 
-        The selections that the integration has met decide, so an interrupted integration continues with the same code
-        as an uninterrupted one.
+        The selections that the integration has met, and the number of its evaluations, decide; so an interrupted
+        integration continues with the same code as an uninterrupted one.
         """
         specialised, rows = self.specialised, self.selected.tobytes()
+        specialised.worthwhile |= bool(self.n[m.EVALUATIONS] >= LONG)
         if specialised.place is not None and specialised.group is None and self.staged:
             where = code_address(
                 self.model, self.h, rows, progress, lanes=specialised.place.width, exact=specialised.exact
@@ -186,7 +190,7 @@ class Engine:
         """Step to the end of the segment or of the budget, in this thread or in the engine's group."""
         group, record = self.specialised.group, (outputs, rows, events)
         if group is not None and self.n[m.TOGETHER]:  # one word per argument except t and repeat
-            words = [*functions.places(self._arrays()), *functions.record(*record)]
+            words = [*functions.addresses_of_arrays(self._arrays()), *functions.record(*record)]
             group.advance(self.entry.addresses["advance"], words)
         else:
             self.entry.advance(self._arrays(), *record)
@@ -287,16 +291,15 @@ def prepare(model: Model, progress: Progress) -> Engine:
     progress(None, mobility.text())
     refuse_singular(model, mobility)
     if IN_PYTHON.get():
-        return uncompiled(model, mobility)
-    alone = equations(model, mobility)
-    entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
+        return engine_in_python(model, mobility)
+    entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text))
     engine = assemble(model, entry, METHODS[solver.integrator], mobility)
     if not mobility.redundant:
         engine.connect(progress)
     return engine
 
 
-def uncompiled(model: Model, mobility: Mobility) -> Engine:
+def engine_in_python(model: Model, mobility: Mobility) -> Engine:
     """Return the engine of a model that Python evaluates."""
     return assemble(model, Uncompiled.of(model), METHODS[model.scene.solver.integrator], mobility)
 
@@ -311,7 +314,7 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     return engine
 
 
-def another(engine: Engine) -> Engine:
+def copy_of_engine(engine: Engine) -> Engine:
     """Return a new engine of the same model, in the state before any run."""
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
     made.specialised.exact = engine.specialised.exact

@@ -1,8 +1,8 @@
 """Specialised code for the topology of a mechanism: which parts exist, and their addresses.
 
-It is compiled once for all scenes of a topology, and runs faster than a list of calls. Where it would be too long,
-steps run a list of calls of routines. All other evaluations are lists that store what the record has. The topology
-alone decides, so that equal scenes give equal bytes.
+It is compiled once for all scenes of a topology, and runs faster than a list of calls. Steps of short runs, and of
+topologies for which it would be too long, run a list of calls of routines. All other evaluations are lists that store
+what the record has. The topology and the number of evaluations decide, so that equal scenes give equal bytes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from flexclear.dynamics.compile.files import PART
 from flexclear.dynamics.compile.sources import SPECIALISED
 from flexclear.dynamics.effects import Parts
 from flexclear.dynamics.model import selection
-from flexclear.dynamics.model.mobility import Mobility
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.specialise.tape import UnsuitedError
 from flexclear.dynamics.specialise.topology import Topology, topology_of
@@ -41,6 +40,7 @@ class SpecialisedCode:
     """Code for one topology (`Engine.settle`), shared by the engines of one work array.
 
     exact: whether one state and several at once must give the same bits.
+    worthwhile: whether the present integration is so long that specialised code saves more than it costs.
     place: for stepping together with others; by default each engine takes its own steps.
     group: the group at that place, for the closure rows of its code.
     addresses: of the code, by the closure rows that it solves for.
@@ -50,6 +50,7 @@ class SpecialisedCode:
     """
 
     exact: bool = False
+    worthwhile: bool = False
     place: Place | None = None
     group: LaneGroup | None = None
     addresses: dict[bytes, int] = field(default_factory=dict)
@@ -57,15 +58,15 @@ class SpecialisedCode:
     running: dict[tuple[bytes, int], ListInstance] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
-
-def equations(model: Model, mobility: Mobility) -> dict[str, str]:
-    """Return the source of specialised steps, by name; none with redundant closure rows, which await a selection."""
-    if mobility.redundant:
-        return {}
-    return {SPECIALISED: sources.specialised(model.parts, topology_of(model.arrays, model.arrays.h))}
+    def begin(self) -> None:
+        """Forget what earlier integrations have met."""
+        self.rows.clear()
+        self.worthwhile = False
 
 
-def address(model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent) -> int:
+def address_for_rows(
+    model: Model, h: np.ndarray, code: SpecialisedCode, rows: bytes, progress: Progress = silent
+) -> int:
     """Return the address of specialised code for closure rows; 0 when there is none."""
     if rows not in code.addresses:
         code.addresses[rows] = code_address(model, h, rows, progress, exact=code.exact)
@@ -80,7 +81,7 @@ def call_list(
     where: the place in h of its address, of which another list has another one (`mechanics.of_topology`).
     """
     from flexclear.dynamics.mechanics.of_topology import list_of  # here: they import the compiler
-    from flexclear.dynamics.routines.store import stored
+    from flexclear.dynamics.routines.store import stored_list
 
     of = rows, where
     if of not in code.running:
@@ -88,7 +89,7 @@ def call_list(
             given = model.parts, topology_of(model.arrays, with_selection(model, h, rows)), where
             with _making:
                 key, place = repr(given).encode(), where if where in (m.CALLS, m.RECORD_CALLS) else None
-                code.lists[of] = stored(key, lambda: list_of(*given), partial(progress, None), place)
+                code.lists[of] = stored_list(key, lambda: list_of(*given), partial(progress, None), place)
         code.running[of] = code.lists[of].instance(h)
     return code.running[of]
 
@@ -154,13 +155,15 @@ def code_address(
         key = (parts, topology, lanes, exact, changes)
         if key not in _known:
             if lanes > 1:
-                source = sources.batched(parts, topology, lanes)
+                source = sources.source_of_lanes(parts, topology, lanes)
             else:
                 source = (
-                    sources.tangent(parts, topology) if changes else sources.specialised(parts, topology, exact=exact)
+                    sources.source_of_tangents(parts, topology)
+                    if changes
+                    else sources.source_of_steps(parts, topology, exact=exact)
                 )
             try:
-                _known[key] = functions.specialised(SPECIALISED, source, partial(progress, None))
+                _known[key] = functions.address_of_specialised(SPECIALISED, source, partial(progress, None))
             except UnsuitedError:
                 if changes:
                     raise

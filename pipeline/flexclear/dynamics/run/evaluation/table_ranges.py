@@ -32,14 +32,14 @@ def _explanations(engine: Any) -> Iterator[str]:
     for (name, joint, *_), touch, closed, latched in zip(*read, strict=False):
         pressed = max(0.0, -touch["gap"]), touch["rate"], max(latched, 1e-300)
         laws = (joint.normal, pressed), (joint.friction, (touch["slip"], touch["normal_force"], 0.0))
-        yield from _left(f"contact {name}", laws if closed else ())
+        yield from _tables_left(f"contact {name}", laws if closed else ())
     bearings = engine.table(m.NAMED["bends"])["sliding"] if scene.joints_with_friction() else ()
     rubbing = [(name, joint) for name, joint in scene.joints_with_friction().items() for _ in BEARINGS[joint.type]]
     for (name, joint), sliding in zip(rubbing, bearings, strict=True):
-        yield from _left(f"joint {name}", [(joint.friction, (np.linalg.norm(sliding), 1.0, 0.0))])
+        yield from _tables_left(f"joint {name}", [(joint.friction, (np.linalg.norm(sliding), 1.0, 0.0))])
 
 
-def _left(where: str, laws: Any) -> Iterator[str]:
+def _tables_left(where: str, laws: Any) -> Iterator[str]:
     """Yield which table each law by an expression leaves at its variables."""
     for law, variables in laws:
         tables = numbers_of(law)

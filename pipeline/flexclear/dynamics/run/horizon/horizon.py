@@ -31,7 +31,7 @@ from flexclear.artifacts.quantities import (
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.run.evaluation.closure_rows import select_rows
-from flexclear.dynamics.run.evaluation.engine import Engine, another
+from flexclear.dynamics.run.evaluation.engine import Engine, copy_of_engine
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import per_speed, project, rates_at_speeds
 from flexclear.dynamics.run.trajectory import Followed, Stop, stop_requested
@@ -75,7 +75,7 @@ class Pair:
         self.added = _times_between(engine, requested)
         self.outputs = np.union1d(requested, self.added)
         self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
-        self._engine, self._observer = another(engine), another(engine)
+        self._engine, self._observer = copy_of_engine(engine), copy_of_engine(engine)
         self._metric = Metric(engine)
         self._run, self._complete, self._ended = self._no_rows(), False, Event()
         self._between = self._run.rows

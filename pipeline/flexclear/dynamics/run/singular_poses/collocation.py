@@ -289,7 +289,7 @@ def _largest_opening(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> 
     return worst
 
 
-def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
+def is_blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
     """Return True when a row is so near a singular pose that its accelerations and forces are rounding."""
     one = recording.record(row[None], len(engine.model.contacts))
     seen = engine.attempt(one.state[0], float(one.time[0]))
@@ -310,7 +310,7 @@ def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: 
         rows_around = recording.record(rows, len(engine.model.contacts))
         rows_around.time[:] += FIRST_DISTANCE * motion.span * WIDER**k * SIDES
         rows_around.state[:] = motion.states(rows_around.time)
-        if not any(blurred(engine, side, clear) for side in rows):
+        if not any(is_blurred(engine, side, clear) for side in rows):
             seen = observe_with(engine, rows, pieces, CLOSED)
             if not np.any(seen["status"]):
                 return {name: WEIGHTS @ block for name, block in seen.items()}
