@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import pi
 from typing import Any, NamedTuple
 
+from flexclear.dynamics.joints.conditions import growth_between, measure, twist_between
 from flexclear.dynamics.mechanics.trees import Motion, Numbers
-from flexclear.dynamics.specialise.symbols import arctan2, nearest
+from flexclear.dynamics.specialise.symbols import nearest
 from flexclear.dynamics.vectors import ZERO, Wrench, cross, dot
 
 
@@ -23,23 +24,14 @@ def along(gauge: Any, turns: Numbers, F: Motion, G: Motion) -> Along:
 
     gauge: how to measure it (`memory.GAUGES`).  turns: an earlier value, from which an angle's full turns are counted.
     """
-    axis = (G if gauge.side else F).R_WB.column(gauge.axis)
-    if gauge.turning:
-        entries = (gauge.sine_f, gauge.sine_g), (gauge.cosine_f, gauge.cosine_g)
-        angle = arctan2(*(dot(F.R_WB.column(f), G.R_WB.column(g)) for f, g in entries))
-        for before in turns:
-            angle = angle + 2.0 * pi * nearest((before - angle) / (2.0 * pi))
-        return Along(angle, dot(axis, G.omega - F.omega), Wrench(axis, ZERO))
-    r = G.p_WB - F.p_WB
-    return Along(dot(axis, r), dot(axis, G.v - F.v - cross(F.omega, r)), Wrench(ZERO, axis))
+    value, unit = measure(gauge, F, G)
+    for before in turns:
+        value = value + 2.0 * pi * nearest((before - value) / (2.0 * pi))
+    return Along(value, unit.on(twist_between(F, G)), unit)
 
 
 def bias(gauge: Any, F: Motion, G: Motion) -> Any:
     """Return the known part of the second rate of the coordinate between frames."""
-    side = G if gauge.side else F
-    axis = side.R_WB.column(gauge.axis)
-    if gauge.turning:
-        return dot(axis, G.alpha - F.alpha) + dot(cross(side.omega, axis), G.omega - F.omega)
-    r = G.p_WB - F.p_WB
-    swing = cross(F.omega, r)
-    return dot(axis, G.a - F.a - cross(F.alpha, r) - cross(F.omega, 2.0 * (G.v - F.v) - swing))
+    side, (_, unit) = G if gauge.side else F, measure(gauge, F, G)
+    swing = cross(side.omega, unit.moment) if gauge.turning else ZERO
+    return unit.on(growth_between(F, G)) + dot(swing, twist_between(F, G).angular)

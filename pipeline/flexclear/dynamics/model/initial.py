@@ -8,16 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.joints.conditions import measure, pose_of
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model import bushings
 from flexclear.dynamics.model.assembly import chain_positions
-from flexclear.dynamics.model.constraints import outboard_place
+from flexclear.dynamics.model.constraints import joint_positions, outboard_place
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.flexible_bodies import second_first_moment, shift, start_place
 from flexclear.dynamics.model.gauges import angles
 from flexclear.dynamics.model.mechanism import Link, Mechanism
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.start_table import given_coordinates, given_modes
+from flexclear.dynamics.vectors import Twist
 from flexclear.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from flexclear.system.errors import InputError
 
@@ -55,8 +57,7 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
         return chain_positions(mechanism, link, starts)
     assert link.inboard is not None
     F = starts[link.inboard.link].of(start_place(mechanism, link.inboard))
-    relative = F.inverse().of(link.start.of(outboard_place(mechanism, link)))
-    return np.asarray(joint_type(link.kind).coordinates(relative.R, relative.p))
+    return joint_positions(link.kind, F, link.start.of(outboard_place(mechanism, link)))
 
 
 @dataclass(frozen=True)
@@ -81,11 +82,9 @@ class Rate:
             return self.sign * float(u[self.speed])
         assert self.coordinate is not None
         a, b = sites[self.sites[0]], sites[self.sites[1]]
-        along = self.coordinate.along(a, b)
-        if self.coordinate.turning:
-            return float(along @ (b["omega"] - a["omega"]))
-        arm = b["origin"] - a["origin"]
-        return float(along @ (b["velocity"] - a["velocity"] - np.cross(a["omega"], arm)))
+        slide = b["velocity"] - a["velocity"] - np.cross(a["omega"], b["origin"] - a["origin"])
+        _, unit = measure(self.coordinate.gauge, pose_of(a), pose_of(b))
+        return float(unit.on(Twist(b["omega"] - a["omega"], slide)))
 
 
 def given_rates(model: Model) -> list[Rate]:

@@ -20,7 +20,7 @@ from flexclear.dynamics.model.constraints import constraints
 from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.model.rates import Rates, motions, rates, row_axes
+from flexclear.dynamics.model.rates import Rates, motions, natural_wrenches, rates
 from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.system.errors import InputError
 
@@ -161,10 +161,10 @@ def _self_stressed(model: Model, here: Rates, poses: Sequence[Placement]) -> fro
     joints, row = set[str](), 0
     for closure in model.closures:
         stress = self_stresses[:, row : row + len(closure.rows)]
-        for acts in row_axes(closure, poses, L):
-            wrench = acts.wrenches(L).T @ stress.T
-            carried[acts.a.link] -= wrench
-            carried[acts.b.link] += wrench
+        for a, b, acting in natural_wrenches(closure, poses, L):
+            wrench = acting.about(np.zeros(3), L).T @ stress.T
+            carried[a.link] -= wrench
+            carried[b.link] += wrench
         if not isinstance(closure, Coupling) and np.max(np.abs(stress), initial=0.0) > CARRIES:
             joints.add(closure.name)
         row += len(closure.rows)
