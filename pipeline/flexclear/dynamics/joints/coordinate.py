@@ -47,7 +47,7 @@ class Coordinate:
 
     @property
     def gauge(self) -> Gauge:
-        """How to measure the coordinate."""
+        """The measurement of the coordinate between frames."""
         return Gauge(int(self.turning), self.side, self.axis, *self.sine, *self.cosine)
 
     def value(self, F: Any, G: Any) -> float:
