@@ -1,15 +1,19 @@
 """What joints ask of two frames: conditions that close a loop, and coordinates; each is a number and a wrench.
 
 The wrench acts on the second frame, about its origin. Its power is the rate of the number: so wrenches are rows of the
-Jacobian, too. Numbers may be symbols.
+Jacobian, too. Numbers may be symbols, or series.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import pi
 from typing import Any, NamedTuple
 
-from flexclear.dynamics.specialise.symbols import arctan2
-from flexclear.dynamics.vectors import ZERO, Matrix, Twist, Vector, Wrench, cross, dot
+import numpy as np
+
+from flexclear.dynamics.specialise.symbols import arctan2, nearest
+from flexclear.dynamics.vectors import ZERO, Matrix, Motion, Twist, Vector, Wrench, cross, dot
 
 
 class Pose(NamedTuple):
@@ -17,11 +21,6 @@ class Pose(NamedTuple):
 
     R_WB: Matrix
     p_WB: Vector
-
-
-def pose_of(frame: Any) -> Pose:
-    """Return the pose of a frame in NumPy's numbers: named fields of SITE_FRAMES."""
-    return Pose(Matrix(frame["axes"].ravel().tolist()), Vector(frame["origin"].tolist()))
 
 
 class Gauge(NamedTuple):
@@ -35,6 +34,14 @@ class Gauge(NamedTuple):
     sine_g: int
     cosine_f: int
     cosine_g: int
+
+
+class Along(NamedTuple):
+    """A coordinate [rad or m] and its rate; unit: wrench of a unit force along it, on the second body at its frame."""
+
+    value: Any
+    rate: Any
+    unit: Wrench
 
 
 def rows(joint: Any) -> list[tuple[int, int, int]]:
@@ -64,12 +71,34 @@ def measure(gauge: Any, F: Any, G: Any) -> tuple[Any, Wrench]:
     return dot(axis, G.p_WB - F.p_WB), Wrench(ZERO, axis)
 
 
-def twist_between(F: Any, G: Any) -> Twist:
+def along(gauge: Any, turns: Sequence[Any], F: Motion, G: Motion) -> Along:
+    """Return the coordinate between frames; turns: an earlier value, from which an angle's full turns are counted."""
+    value, unit = measure(gauge, F, G)
+    for before in turns:
+        value = value + 2.0 * pi * nearest((before - value) / (2.0 * pi))
+    return Along(value, unit.on(twist_between(F, G)), unit)
+
+
+def second_rate(gauge: Any, F: Motion, G: Motion) -> Any:
+    """Return the second rate of the coordinate between frames, as far as their accelerations are known."""
+    side, (_, unit) = G if gauge.side else F, measure(gauge, F, G)
+    swing = cross(side.omega, unit.moment) if gauge.turning else ZERO
+    return unit.on(growth_between(F, G)) + dot(swing, twist_between(F, G).angular)
+
+
+def frame_motion(frame: Any) -> Motion:
+    """Return the motion of a frame by its named fields (`memory.FRAME`), each a number or a series of them."""
+    axes = frame["axes"].reshape(*frame["axes"].shape[:-2], 9)
+    vectors = (frame[name] for name in ("origin", "omega", "velocity", "alpha", "acceleration"))
+    return Motion(Matrix(np.moveaxis(axes, -1, 0)), *(Vector(np.moveaxis(one, -1, 0)) for one in vectors))
+
+
+def twist_between(F: Motion, G: Motion) -> Twist:
     """Return the motion of frame G relative to the body of frame F, at the origin of G."""
     return Twist(G.omega - F.omega, G.v - F.v - cross(F.omega, G.p_WB - F.p_WB))
 
 
-def growth_between(F: Any, G: Any) -> Twist:
+def growth_between(F: Motion, G: Motion) -> Twist:
     """Return the rate of `twist_between` as the body of F sees it, without the part from unknown rates of speeds."""
     r, slide = G.p_WB - F.p_WB, twist_between(F, G).linear
     a = G.a - F.a - cross(F.alpha, r) - cross(F.omega, cross(F.omega, r) + 2.0 * slide)

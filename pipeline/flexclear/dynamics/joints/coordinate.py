@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.dynamics.joints.conditions import Gauge, measure
+from flexclear.dynamics.joints.conditions import Gauge, frame_motion, measure
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,14 @@ class Coordinate:
         """Return the coordinate [rad in (-pi, pi], or m] at placements of the frames."""
         return float(measure(self.gauge, F.pose, G.pose)[0])
 
-    def along(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return the coordinate's axis, shape (..., 3), at frames F and G: named fields of SITE_FRAMES, shape (...)."""
-        axis: np.ndarray = (b if self.side else a)["axes"][..., :, self.axis]
-        return axis
+    def wrench(self, a: np.ndarray, b: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
+        """Return moment about the mechanism's origin and force on G, for a force `size` along the coordinate.
 
-    def wrench(self, a: np.ndarray, b: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return moment about the mechanism's origin and force on G, for a force `size` along the coordinate."""
-        push = size[..., None] * self.along(a, b)
-        return (push, np.zeros_like(push)) if self.turning else (np.cross(b["origin"], push), push)
+        a, b: frames F and G in named fields (`memory.FRAME`), shape (time,); each result has the shape (time, 3).
+        """
+        F, G = frame_motion(a), frame_motion(b)
+        wrench = measure(self.gauge, F, G)[1] * size
+        return [np.stack(part, axis=-1) for part in wrench.about(G.p_WB)]
 
     @property
     def axes(self) -> np.ndarray:

@@ -26,10 +26,10 @@ from flexclear.dynamics.contact.surfaces.separation import across
 from flexclear.dynamics.effects.declared import BALL, PIN, SLIDER
 from flexclear.dynamics.joints.conditions import twist_between
 from flexclear.dynamics.mechanics.contacts import rub
-from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, on_both, site_motion
+from flexclear.dynamics.mechanics.trees import End, Numbers, Resistance, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import larger, select, sqrt
-from flexclear.dynamics.vectors import ZERO, Matrix, Twist, Vector, Wrench, cross, dot
+from flexclear.dynamics.vectors import ZERO, Matrix, Motion, Twist, Vector, Wrench, cross, dot
 
 #: most Newton iterations; change of the loads, as a fraction of the largest, at which they end, and below which they
 #: end when it stops shrinking; strides in which friction is increased where they fail; pivots that count as zero

@@ -16,10 +16,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from flexclear.dynamics.joints.conditions import condition, growth_between, twist_between
-from flexclear.dynamics.mechanics.trees import Gains, Motion, Numbers, Site, Step, site_motion
+from flexclear.dynamics.mechanics.trees import Gains, Numbers, Site, Step, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import larger, select, smaller, sqrt
-from flexclear.dynamics.vectors import ZERO, Twist, Vector, Wrench, cross, dot
+from flexclear.dynamics.vectors import ZERO, Motion, Twist, Vector, Wrench, cross, dot
 
 #: pivots of J M^-1 J^T below this fraction of their diagonal entry indicate a singular pose
 SINGULAR = 1e-13

@@ -39,7 +39,8 @@ def assemble(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, *, exa
     wrong = ill_fitting(mechanism, joints, poses) or opposite(joints, poses)
     search = free and not mechanism.has_paths and (wrong is not None or bool(starts))
     judged = between if search else joints
-    wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
+    if search:
+        wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
     if wrong is not None:
         raise wrong
     contradicted = given_start.contradictions(mechanism, joints, poses, given)

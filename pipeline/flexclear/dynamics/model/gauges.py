@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flexclear.dynamics.joints.conditions import Gauge, measure, pose_of
+from flexclear.dynamics.joints.conditions import Gauge, frame_motion, measure
 from flexclear.dynamics.joints.coordinate import Coordinate
 
 
@@ -54,7 +54,7 @@ def values(gauges: np.ndarray, sites: np.ndarray, internal: np.ndarray) -> list[
     entries = []
     for row in gauges:
         how = Gauge(*(int(row[name]) for name in Gauge._fields))
-        value = float(measure(how, *(pose_of(sites[row[end]]) for end in "ab"))[0])
+        value = float(measure(how, *(frame_motion(sites[row[end]]) for end in "ab"))[0])
         turns = round((internal[row["turns"]] - value) / (2.0 * np.pi)) if row["turns"] >= 0 else 0
         entries.append(value + 2.0 * np.pi * turns)
     return entries

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.joints.conditions import measure, pose_of
+from flexclear.dynamics.joints.conditions import along, frame_motion
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model import bushings
 from flexclear.dynamics.model.assembly import chain_positions
@@ -19,7 +19,6 @@ from flexclear.dynamics.model.gauges import angles
 from flexclear.dynamics.model.mechanism import Link, Mechanism
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.start_table import given_coordinates, given_modes
-from flexclear.dynamics.vectors import Twist
 from flexclear.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from flexclear.system.errors import InputError
 
@@ -81,10 +80,7 @@ class Rate:
         if self.speed is not None:
             return self.sign * float(u[self.speed])
         assert self.coordinate is not None
-        a, b = sites[self.sites[0]], sites[self.sites[1]]
-        slide = b["velocity"] - a["velocity"] - np.cross(a["omega"], b["origin"] - a["origin"])
-        _, unit = measure(self.coordinate.gauge, pose_of(a), pose_of(b))
-        return float(unit.on(Twist(b["omega"] - a["omega"], slide)))
+        return float(along(self.coordinate.gauge, (), *(frame_motion(sites[k]) for k in self.sites)).rate)
 
 
 def given_rates(model: Model) -> list[Rate]:
