@@ -49,7 +49,7 @@ def rows(joint: Any) -> list[tuple[int, int, int]]:
     return [*((0, axis, 0) for axis in joint.TRANSLATIONS), *((1, *axes) for axes in joint.ROTATIONS)]
 
 
-def condition(F: Any, G: Any, kind: int, i: int, j: int) -> tuple[Any, Wrench]:
+def condition(F: Pose | Motion, G: Pose | Motion, kind: int, i: int, j: int) -> tuple[Any, Wrench]:
     """Return what is zero between fitting frames, and its wrench.
 
     kind: 0 forbids displacement along axis i of F, 1 keeps axis i of F perpendicular to axis j of G.
@@ -62,7 +62,7 @@ def condition(F: Any, G: Any, kind: int, i: int, j: int) -> tuple[Any, Wrench]:
     return dot(along, against), Wrench(cross(against, along), ZERO)
 
 
-def measure(gauge: Any, F: Any, G: Any) -> tuple[Any, Wrench]:
+def measure(gauge: Any, F: Pose | Motion, G: Pose | Motion) -> tuple[Any, Wrench]:
     """Return a coordinate [rad in (-pi, pi], or m] between frames, and the wrench of a unit force along it."""
     axis = (G if gauge.side else F).R_WB.column(gauge.axis)
     if gauge.turning:

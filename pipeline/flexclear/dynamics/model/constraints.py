@@ -114,14 +114,14 @@ def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
 def demands(kind: str, A: Placement, B: Placement, values: Mapping[int, float] = NO_VALUES) -> Demands:
     """Return residuals and wrenches of a joint between two frames, then of its coordinates with prescribed values."""
     declared, F, G = joint_type(kind), A.pose, B.pose
-    made = [condition(F, G, *row) for row in rows(declared)]
+    conditions = [condition(F, G, *row) for row in rows(declared)]
     for k, value in values.items():
         coordinate = declared.COORDINATES[k]
         now, wrench = measure(coordinate.gauge, F, G)
         miss = now - value
-        made.append(((miss + np.pi) % (2.0 * np.pi) - np.pi if coordinate.turning else miss, wrench))
-    wrenches = np.array([[*wrench.moment, *wrench.force] for _, wrench in made])
-    return Demands(np.array([residual for residual, _ in made]), wrenches.reshape(-1, 6), B.p)
+        conditions.append(((miss + np.pi) % (2.0 * np.pi) - np.pi if coordinate.turning else miss, wrench))
+    wrenches = np.array([[*wrench.moment, *wrench.force] for _, wrench in conditions])
+    return Demands(np.array([residual for residual, _ in conditions]), wrenches.reshape(-1, 6), B.p)
 
 
 def joint_positions(kind: str, F: Placement, G: Placement) -> np.ndarray:

@@ -56,11 +56,13 @@ def assemblies(
             poses = close(mechanism, joints, here, within=within)
         if poses is None or opposite(joints, poses) is not None:
             continue
-        made = Assembly(poses, _coordinates(joints, poses))
-        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME_ASSEMBLY for other in distinct):
-            distinct.append(made)
+        assembly = Assembly(poses, _coordinates(joints, poses))
+        if all(
+            _distance(mechanism, joints, assembly.coordinates, other.coordinates) > SAME_ASSEMBLY for other in distinct
+        ):
+            distinct.append(assembly)
         # the search ends at an assembly that can move and is closer than this to all hints
-        if _freedoms(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < 0.5:
+        if _freedoms(mechanism, joints, poses) and _distance(mechanism, joints, assembly.coordinates, hints) < 0.5:
             break  # a mechanism that can move: its first assembly near the hints counts
     from_hints = [_distance(mechanism, joints, one.coordinates, hints) for one in distinct]
     nearest = min(from_hints, default=0.0)

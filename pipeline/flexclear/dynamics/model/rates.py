@@ -133,11 +133,11 @@ def natural_wrenches(
     frames = [(poses[a.link].of(a.placement), poses[b.link].of(b.placement)) for a, b in closure.ends]
     if isinstance(closure, Closure):
         return [(*closure.ends[0], demands(closure.edge.kind, *frames[0]).natural(length))]
-    made, unit = list[tuple[Site, Site, Demands]](), 1.0 if closure.second.coordinate.turning else length
+    sides, unit = list[tuple[Site, Site, Demands]](), 1.0 if closure.second.coordinate.turning else length
     for ends, (side, factor), (A, B) in zip(closure.ends, closure.parts, frames, strict=True):
         wrench = measure(side.coordinate.gauge, A.pose, B.pose)[1] * (factor / unit)
-        made.append((*ends, Demands(np.zeros(1), np.array([[*wrench.moment, *wrench.force]]), B.p)))
-    return made
+        sides.append((*ends, Demands(np.zeros(1), np.array([[*wrench.moment, *wrench.force]]), B.p)))
+    return sides
 
 
 def motions(model: Model, poses: Sequence[Placement]) -> Motions:
