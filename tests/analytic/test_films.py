@@ -14,9 +14,8 @@ from flexclear.dynamics import analyses
 from flexclear.dynamics.loads import film
 from flexclear.dynamics.loads.given import Given
 from flexclear.dynamics.loads.half_circle import half_circle
-from flexclear.dynamics.mechanics.trees import Motion
 from flexclear.dynamics.sensitivity.dataset import sensitivities
-from flexclear.dynamics.vectors import UNIT, ZERO, Matrix, Vector
+from flexclear.dynamics.vectors import UNIT, ZERO, Matrix, Motion, Vector
 from flexclear.scene.films import actions_of, films_of
 from flexclear.scene.load import edited
 from flexclear.scene.quantity import parse

@@ -15,11 +15,11 @@ from flexclear.dynamics.contact import form as forms
 from flexclear.dynamics.contact import friction
 from flexclear.dynamics.contact import surfaces as surfaces_of_joints
 from flexclear.dynamics.mechanics.contacts import touch as touched
-from flexclear.dynamics.mechanics.trees import Motion, Site
+from flexclear.dynamics.mechanics.trees import Site
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.specialise.symbols import leaves
-from flexclear.dynamics.vectors import UNIT, ZERO, Matrix, Vector
+from flexclear.dynamics.vectors import UNIT, ZERO, Matrix, Motion, Vector
 from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.scene.loose_joints import CONTACTS
 from flexclear.scene.parts import Joint

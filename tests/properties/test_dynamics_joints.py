@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flexclear.dynamics import joints
-from flexclear.numerics.rotations import rotation_vector_to_quaternion, skew
+from flexclear.dynamics.model.constraints import Demands, demands, joint_positions, moved_frame
+from flexclear.dynamics.model.merge import Placement
+from flexclear.numerics.rotations import rotation_vector_to_matrix, rotation_vector_to_quaternion, skew
 
 STEP = 1e-3
 #: fourth-order differences over STEP: angular rates of some rad/s give 3^5 (1e-3)^4 / 30 = 1e-11, rounding 1e-12
@@ -54,6 +56,12 @@ def coordinates(name: str, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
         turning = random.normal(size=3)
         x[:4] = rotation_vector_to_quaternion(turning / np.linalg.norm(turning) * random.uniform(0.0, 3.1))
     return x, random.uniform(-2.0, 2.0, len(part.SPEEDS)), random.uniform(-5.0, 5.0, len(part.SPEEDS))
+
+
+def anywhere(seed: int) -> Placement:
+    """Any frame."""
+    random = np.random.default_rng(seed)
+    return Placement(random.uniform(-2.0, 2.0, 3), rotation_vector_to_matrix(random.normal(size=3)))
 
 
 def later(name: str, x: np.ndarray, u: np.ndarray, du: np.ndarray, time: float) -> np.ndarray:
@@ -134,9 +142,25 @@ def test_the_motion_subspace_holds_the_rates_per_unit_of_each_speed(name: str, s
 def test_coordinates_invert_the_motion(name: str, seed: int) -> None:
     x, u, du = coordinates(name, seed)
     motion = move(name, x, u, du)
-    R, p = motion.R, motion.p
+    F = anywhere(seed)
     # rounding of R, at angles of 3.1 rad divided by cos(1.55) = 0.02
-    assert declared(name).coordinates(R, p) == pytest.approx(x, abs=1e-13)
+    assert joint_positions(name, F, F.of(Placement(motion.p, motion.R))) == pytest.approx(x, abs=1e-13)
+
+
+@every_joint
+@seeds
+def test_wrenches_of_conditions_and_coordinates_have_their_rates_as_power(name: str, seed: int) -> None:
+    """Whatever the frames do: also against what the joint forbids."""
+    x, *_ = coordinates(name, seed)
+    F, twist = anywhere(seed), np.random.default_rng(seed).uniform(-2.0, 2.0, 6)
+    G, values = moved_frame(name, F, x), dict.fromkeys(range(len(declared(name).COORDINATES)), 0.0)
+
+    def demanded(time: float) -> Demands:
+        turn = rotation_vector_to_matrix(time * twist[:3])
+        return demands(name, F, Placement(G.p + time * twist[3:], turn @ G.R), values)
+
+    found = {k: demanded(k * STEP).residuals for k in (-2, -1, 1, 2)}
+    assert demanded(0.0).wrenches @ twist == pytest.approx(slope(found), abs=DIFFERENCE)
 
 
 @every_joint

@@ -22,8 +22,9 @@ from flexclear.dynamics.mechanics.evaluation import evaluate as evaluated_by
 from flexclear.dynamics.mechanics.of_topology import list_of, mechanism_of
 from flexclear.dynamics.mechanics.tables import Tables
 from flexclear.dynamics.model import selection
-from flexclear.dynamics.model.driving import joint_type
+from flexclear.dynamics.model.constraints import joint_positions, moved_frame
 from flexclear.dynamics.model.mechanism import build
+from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.routines.store import load
@@ -235,7 +236,7 @@ def test_dependent_rows_are_a_singular_pose() -> None:
 # Joints ---------------------------------------------------------------------------------------------------------------
 def positions(kind: str, random: np.random.Generator, scale: float) -> np.ndarray:
     """Random positions of a joint; quaternions of another norm than 1."""
-    return scale * random.normal(size=len(joint_type(kind).POSITIONS))
+    return scale * random.normal(size=len(JOINTS[kind].POSITIONS))
 
 
 @pytest.mark.parametrize("kind", [kind for kind in JOINTS if kind != "fixed"])
@@ -243,7 +244,7 @@ def positions(kind: str, random: np.random.Generator, scale: float) -> np.ndarra
 def test_motions_of_joints_are_rates_of_their_poses(kind: str, scale: float) -> None:
     """By central differences along the rate of the positions, whose error is the square of the step; on floats."""
     random, step = np.random.default_rng(3), 1e-5
-    x, u = positions(kind, random, scale), random.normal(size=len(joint_type(kind).SPEEDS))
+    x, u = positions(kind, random, scale), random.normal(size=len(JOINTS[kind].SPEEDS))
     joint = JOINTS[kind]
 
     def twist(x: np.ndarray) -> np.ndarray:
@@ -263,10 +264,10 @@ def test_motions_of_joints_are_rates_of_their_poses(kind: str, scale: float) -> 
 def test_positions_of_joints_are_those_that_poses_have(kind: str) -> None:
     """By what places the start pose; quaternions up to their norm."""
     x = positions(kind, np.random.default_rng(4), 0.7)
-    here, size = JOINTS[kind].motion(x.tolist(), np.zeros(6).tolist()), np.ones(len(x))
+    size = np.ones(len(x))
     if kind in ("spherical", "free"):
         size[:4] = np.copysign(np.linalg.norm(x[:4]), x[0])
-    found = joint_type(kind).coordinates(np.reshape(here.R_FG, (3, 3)), np.array(here.p_FG))
+    found = joint_positions(kind, Placement(), moved_frame(kind, Placement(), x))
     assert found == pytest.approx(x / size, abs=1e-13)
 
 

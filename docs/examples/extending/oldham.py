@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.joints.relative import Relative, rates_are_speeds
 from flexclear.dynamics.vectors import AXES, UNIT, ZERO, Twist, Vector
@@ -22,8 +20,3 @@ POSITIONS, SPEEDS = "tt", "tt"  #: r: rotation [rad or -], t: translation [m]
 TRANSLATIONS: tuple[int, ...] = (2,)
 ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 0))
 COORDINATES = (Coordinate("x", False, axis=0), Coordinate("y", False, axis=1))
-
-
-def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Displacements along x and y [m], shape (2,)."""
-    return p[:2]

@@ -120,6 +120,17 @@ class Twist(NamedTuple):
         return Twist(self.angular, self.linear + cross(self.angular, arm))
 
 
+class Motion(NamedTuple):
+    """Motion of a frame in the world, in its axes. alpha, a: without the part from unknown rates of speeds."""
+
+    R_WB: Matrix
+    p_WB: Vector
+    omega: Vector
+    v: Vector
+    alpha: Vector
+    a: Vector
+
+
 class Wrench(NamedTuple):
     """A moment about a point [N m] and a force [N]."""
 

@@ -11,7 +11,7 @@ and with
 - ``ROTATIONS``: pairs (axis of the first frame, axis of the second) that a closure keeps perpendicular;
 - ``COORDINATES``: its freedoms by name, in the order of the speeds, where drives and loads may act on them;
   its motion applies these turns and slides one after the other, from the first frame on (see `coordinate`);
-- ``coordinates(R, p)``: joint positions of a relative pose, for the start pose.
+- where its positions are no coordinates, ``coordinates(R, p)``: joint positions of a relative pose, for the start pose.
 """
 
 from __future__ import annotations

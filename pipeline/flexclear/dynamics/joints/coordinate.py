@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2
 from typing import Any
 
 import numpy as np
+
+from flexclear.dynamics.joints.conditions import Gauge, frame_motion, measure
 
 
 @dataclass(frozen=True)
@@ -44,22 +45,23 @@ class Coordinate:
         """Joint type with this freedom alone, about or along its z axis."""
         return "revolute" if self.turning else "prismatic"
 
+    @property
+    def gauge(self) -> Gauge:
+        """The measurement of the coordinate between frames."""
+        return Gauge(int(self.turning), self.side, self.axis, *self.sine, *self.cosine)
+
     def value(self, F: Any, G: Any) -> float:
-        """Return the coordinate [rad in (-pi, pi], or m] at placements of the frames, with `p` (3,) and `R` (3, 3)."""
-        if self.turning:
-            R = F.R.T @ G.R
-            return atan2(R[self.sine], R[self.cosine])
-        return float((G if self.side else F).R[:, self.axis] @ (G.p - F.p))
+        """Return the coordinate [rad in (-pi, pi], or m] at placements of the frames."""
+        return float(measure(self.gauge, F.pose, G.pose)[0])
 
-    def along(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return the coordinate's axis, shape (..., 3), at frames F and G: named fields of SITE_FRAMES, shape (...)."""
-        axis: np.ndarray = (b if self.side else a)["axes"][..., :, self.axis]
-        return axis
+    def wrench(self, a: np.ndarray, b: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
+        """Return moment about the mechanism's origin and force on G, for a force `size` along the coordinate.
 
-    def wrench(self, a: np.ndarray, b: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return moment about the mechanism's origin and force on G, for a force `size` along the coordinate."""
-        push = size[..., None] * self.along(a, b)
-        return (push, np.zeros_like(push)) if self.turning else (np.cross(b["origin"], push), push)
+        a, b: frames F and G in named fields (`memory.FRAME`), shape (time,); each result has the shape (time, 3).
+        """
+        F, G = frame_motion(a), frame_motion(b)
+        wrench = measure(self.gauge, F, G)[1] * size
+        return [np.stack(part, axis=-1) for part in wrench.about(G.p_WB)]
 
     @property
     def axes(self) -> np.ndarray:
@@ -69,9 +71,3 @@ class Coordinate:
 
 ROTATION, ROTATION_Y = Coordinate("rotation", True), Coordinate("rotation", True, axis=1, sine=(0, 2))
 TRANSLATION = Coordinate("translation", False)
-
-
-def angle_about(R: np.ndarray, axis: int = 2) -> float:
-    """Return the angle [rad] in (-pi, pi] of the rotation about an axis that equals R or is nearest to R."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    return float(np.arctan2(R[j, i] - R[i, j], R[i, i] + R[j, j]))

@@ -6,9 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from flexclear.dynamics.joints.coordinate import ROTATION, ROTATION_Y, TRANSLATION, Coordinate, angle_about
+from flexclear.dynamics.joints.coordinate import ROTATION, ROTATION_Y, TRANSLATION, Coordinate
 from flexclear.dynamics.joints.relative import Relative, rates_are_speeds
 from flexclear.dynamics.specialise.symbols import cos, sin
 from flexclear.dynamics.vectors import AXES, UNIT, ZERO, Matrix, Twist, Vector
@@ -28,10 +26,6 @@ class Joint:
     ROTATIONS: tuple[tuple[int, int], ...]
     motion: Callable[[Any, Any], Relative]
     position_rate: Callable[[Any, Any], Any] = rates_are_speeds
-
-    def coordinates(self, R: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Return angles [rad] in (-pi, pi] and displacements [m] of a relative pose, one per coordinate."""
-        return np.array([angle_about(R, one.axis) if one.turning else p[one.axis] for one in self.COORDINATES])
 
 
 def joint(*coordinates: Coordinate) -> Joint:

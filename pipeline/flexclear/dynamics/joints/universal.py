@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.joints.relative import Relative, rates_are_speeds
 from flexclear.dynamics.specialise.symbols import cos, sin
@@ -30,8 +28,3 @@ COORDINATES = (
     Coordinate("first", True, axis=0, sine=(2, 1), cosine=(1, 1)),
     Coordinate("second", True, axis=1, side=1, sine=(0, 2), cosine=(0, 0)),
 )
-
-
-def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Return the angles about x of the first and y of the second frame [rad] in (-pi, pi], shape (2,)."""
-    return np.array([np.arctan2(R[2, 1], R[1, 1]), np.arctan2(R[0, 2], R[0, 0])])

@@ -28,7 +28,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics.model.closing import displaced_poses, misfit
-from flexclear.dynamics.model.constraints import Constraint, constraints, coordinate_demands, demands
+from flexclear.dynamics.model.constraints import Constraint, constraints
 from flexclear.dynamics.model.contacts import resolve_law
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.merge import Placement
@@ -157,20 +157,10 @@ def opening_map(model: Model, joints: Sequence[Constraint], poses: Sequence[Plac
     factored = splu(normal + least * sparse.eye_array(normal.shape[0], format="csc"))
     where, row, length = {}, 0, model.mechanism.length
     for joint in joints:
-        wrenches = _wrenches(joint, poses)
-        unit = np.where(np.any(wrenches[:, 3:] != 0.0, axis=1), 1.0 / length, 1.0)
-        where[joint.name] = joint, slice(row, row + len(wrenches)), unit[:, None] * wrenches
+        wrenches = joint.demands(poses, joint.values).natural(length).about(np.zeros(3))
+        where[joint.name] = joint, slice(row, row + len(wrenches)), wrenches
         row += len(wrenches)
     return OpeningMap(G, factored, where, length)
-
-
-def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
-    """Return the wrenches of a joint's rows in `misfit`: constraints, then driven coordinates."""
-    A, B = joint.frames(poses)
-    demanded = demands(joint.edge.kind, A, B)[1]
-    return (
-        np.vstack([demanded, coordinate_demands(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else demanded
-    )
 
 
 def body_motion(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:

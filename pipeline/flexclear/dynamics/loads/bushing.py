@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.dynamics.joints.conditions import twist_between
 from flexclear.dynamics.loads.given import Given, Load
 from flexclear.dynamics.loads.row import Row
 from flexclear.dynamics.specialise.symbols import arctan2, branch, cos, larger, sin, sqrt
@@ -42,8 +43,7 @@ def apply(given: Given) -> Load:
     K, C, circulating = (given.numbers[k : k + 36] for k in (0, 36, 72))
     F, G, before = given.F, given.G, given.states
     R_FW, r = F.R_WB.T, G.p_WB - F.p_WB
-    slide = G.v - F.v - cross(F.omega, r)
-    x, x_rate, spin = R_FW @ r, R_FW @ slide, R_FW @ (G.omega - F.omega)
+    x, (spin, x_rate) = R_FW @ r, twist_between(F, G).seen(R_FW)
     theta = rotation_vector(R_FW @ G.R_WB)
     theta = continued(theta, Vector(before)) if before else theta
     e = tangent_part(theta)

@@ -29,6 +29,7 @@ from collections.abc import Sequence
 from math import pi
 from typing import Any
 
+from flexclear.dynamics.joints.conditions import twist_between
 from flexclear.dynamics.loads.given import Given, Load
 from flexclear.dynamics.loads.half_circle import half_circle
 from flexclear.dynamics.loads.row import Row
@@ -54,12 +55,12 @@ def apply(given: Given, model: str) -> Load:
     eccentricity = own * _within(dot(own, own), rough)
     acting = _of_ball(eccentricity, v) if model == "ball" else _of_pin(model, eccentricity, v, numbers)
     force = R @ acting * -resistance
-    torque, spin = 0.5 * cross(force, e), G.omega - F.omega
+    torque, passing = 0.5 * cross(force, e), twist_between(F, G)
     if model != "ball":
         axis = R.column(2)
-        torque = torque - axis * (numbers[0] / sqrt(1.0 - dot(eccentricity, eccentricity)) * dot(spin, axis))
-    power = dot(force, G.v - F.v - cross(F.omega, e)) + dot(torque, spin)
-    return Load(Wrench(torque, force), lost=-power)
+        torque = torque - axis * (numbers[0] / sqrt(1.0 - dot(eccentricity, eccentricity)) * dot(passing.angular, axis))
+    wrench = Wrench(torque, force)
+    return Load(wrench, lost=-wrench.on(passing))
 
 
 def _within(squared: Any, rough: Any) -> Any:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from flexclear.dynamics.joints.conditions import Along
 from flexclear.dynamics.specialise.symbols import branch, sqrt
-from flexclear.dynamics.vectors import ZERO, Matrix, Vector, Wrench, dot
-
-if TYPE_CHECKING:
-    from flexclear.dynamics.mechanics.coordinates import Along
-    from flexclear.dynamics.mechanics.trees import Motion
+from flexclear.dynamics.vectors import ZERO, Matrix, Motion, Vector, Wrench, dot
 
 
 class Law(NamedTuple):

@@ -11,6 +11,7 @@ from flexclear.dynamics import memory as m
 from flexclear.dynamics.contact.expression import sizes as law_sizes
 from flexclear.dynamics.contact.form.expression import sizes as form_sizes
 from flexclear.dynamics.contact.wear import LEDGER
+from flexclear.dynamics.joints.conditions import Gauge
 from flexclear.dynamics.loads import LOADS
 from flexclear.dynamics.loads.given import Law
 from flexclear.dynamics.lookup import length
@@ -24,8 +25,7 @@ from flexclear.dynamics.routines.calls import MODES, RATES, SCENE, STATE, Cell, 
 from flexclear.dynamics.specialise import topology as topologies
 from flexclear.dynamics.vectors import UNIT, ZERO
 
-#: of a coordinate and of a bearing, what code depends on: fields of GAUGES and of the bearings' table
-Gauge: Any = namedtuple("Gauge", "turning side axis sine_f sine_g cosine_f cosine_g")
+#: of a bearing, what code depends on: fields of its table
 Bearing: Any = namedtuple("Bearing", "kind side axis")
 
 

@@ -24,11 +24,12 @@ from typing import Any, NamedTuple
 
 from flexclear.dynamics.contact.surfaces.separation import across
 from flexclear.dynamics.effects.declared import BALL, PIN, SLIDER
+from flexclear.dynamics.joints.conditions import twist_between
 from flexclear.dynamics.mechanics.contacts import rub
-from flexclear.dynamics.mechanics.trees import End, Motion, Numbers, Resistance, on_both, site_motion
+from flexclear.dynamics.mechanics.trees import End, Numbers, Resistance, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import larger, select, sqrt
-from flexclear.dynamics.vectors import ZERO, Matrix, Twist, Vector, Wrench, cross, dot
+from flexclear.dynamics.vectors import ZERO, Matrix, Motion, Twist, Vector, Wrench, cross, dot
 
 #: most Newton iterations; change of the loads, as a fraction of the largest, at which they end, and below which they
 #: end when it stops shrinking; strides in which friction is increased where they fail; pivots that count as zero
@@ -54,8 +55,8 @@ def friction_of(bearing: Any, law: str, numbers: Any, bristle: Numbers, a: End, 
     bearing: see `effects.joint_friction`.
     """
     F, G = site_motion(*a), site_motion(*b)
-    R, r = (G if bearing.side else F).R_WB, G.p_WB - F.p_WB
-    n, turning, sliding = R.column(bearing.axis), G.omega - F.omega, G.v - F.v - cross(F.omega, r)
+    R, (turning, sliding) = (G if bearing.side else F).R_WB, twist_between(F, G)
+    n = R.column(bearing.axis)
     if bearing.kind == BALL:
         slip = F.R_WB.T @ (numbers.radius * turning)
     else:

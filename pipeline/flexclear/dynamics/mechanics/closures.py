@@ -15,10 +15,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from flexclear.dynamics.mechanics.trees import Gains, Motion, Numbers, Site, Step, site_motion
+from flexclear.dynamics.joints.conditions import condition, growth_between, twist_between
+from flexclear.dynamics.mechanics.trees import Gains, Numbers, Site, Step, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import larger, select, smaller, sqrt
-from flexclear.dynamics.vectors import ZERO, Twist, Vector, Wrench, cross, dot
+from flexclear.dynamics.vectors import ZERO, Motion, Twist, Vector, Wrench, cross, dot
 
 #: pivots of J M^-1 J^T below this fraction of their diagonal entry indicate a singular pose
 SINGULAR = 1e-13
@@ -48,22 +49,18 @@ def closure(rows: Sequence[tuple[int, int, int]], kept: int, a: tuple[Motion, Si
 
 
 def row(a: Motion, b: Motion, kind: int, i: int, j: int) -> tuple[Any, Any, Any, Wrench]:
-    """Return residual of a row, its rate, the rate of that which the accelerations must cancel, and the wrench on b.
+    """Return residual of a condition, its rate, the rate of that which the accelerations must cancel, and its wrench.
 
-    kind: 0 forbids displacement along axis i of a, 1 keeps axis i of a perpendicular to axis j of b.  The wrench is
-    about the origin of b.  Source: Wang & Wang (2019), eqs. (30), (31).
+    kind, i, j: see `joints.conditions.condition`.
     """
-    along = a.R_WB.column(i)
-    if kind == 0:
-        r = b.p_WB - a.p_WB
-        slide = b.v - a.v - cross(a.omega, r)
-        bias = b.a - a.a - cross(a.alpha, r) - cross(a.omega, cross(a.omega, r) + 2.0 * slide)
-        return dot(along, r), dot(along, slide), -dot(along, bias), Wrench(ZERO, along)
-    against, turning = b.R_WB.column(j), b.omega - a.omega
-    about = cross(against, along)
-    swing = cross(cross(b.omega, against), along) + cross(against, cross(a.omega, along))
-    gamma = -dot(b.alpha - a.alpha, about) - dot(turning, swing)
-    return dot(along, against), dot(turning, about), gamma, Wrench(about, ZERO)
+    residual, wrench = condition(a, b, kind, i, j)
+    passing, growing = twist_between(a, b), growth_between(a, b)
+    gamma = -wrench.on(growing)
+    if kind == 1:
+        along, against = a.R_WB.column(i), b.R_WB.column(j)
+        swing = cross(cross(b.omega, against), along) + cross(against, cross(a.omega, along))
+        gamma = gamma - dot(passing.angular, swing)
+    return residual, wrench.on(passing), gamma, wrench
 
 
 @routine

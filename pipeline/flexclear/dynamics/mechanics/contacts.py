@@ -18,7 +18,7 @@ from flexclear.dynamics.contact.friction import FRICTION_LAWS
 from flexclear.dynamics.contact.surfaces import SURFACES
 from flexclear.dynamics.contact.surfaces.profile import separate
 from flexclear.dynamics.contact.surfaces.separation import across
-from flexclear.dynamics.mechanics.coordinates import along
+from flexclear.dynamics.joints.conditions import along
 from flexclear.dynamics.mechanics.trees import End, Numbers, moving, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import branch, larger, sqrt

@@ -29,7 +29,6 @@ from flexclear.dynamics.joints.rotation_vector import rotation, series
 from flexclear.dynamics.mechanics.closures import Rows, Wrenches
 from flexclear.dynamics.mechanics.trees import (
     Columns,
-    Motion,
     Numbers,
     Site,
     Step,
@@ -40,6 +39,7 @@ from flexclear.dynamics.vectors import (
     ZERO,
     Inertia,
     Matrix,
+    Motion,
     Symmetric,
     Twist,
     Vector,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from flexclear.dynamics.joints.conditions import along
 from flexclear.dynamics.loads import LOADS
 from flexclear.dynamics.loads.expressions import evaluated
 from flexclear.dynamics.loads.given import Given, Law, line
-from flexclear.dynamics.mechanics.coordinates import along
 from flexclear.dynamics.mechanics.trees import End, Numbers, on_both, site_motion
 from flexclear.dynamics.routines.calls import routine
 from flexclear.dynamics.specialise.symbols import Indexed

@@ -17,13 +17,12 @@ from flexclear.dynamics.mechanics.trees import (
     Bounds,
     Columns,
     Coordinates,
-    Motion,
     Resistance,
     Site,
     Step,
 )
 from flexclear.dynamics.routines.calls import Cell
-from flexclear.dynamics.vectors import AT_REST, Twist, Wrench
+from flexclear.dynamics.vectors import AT_REST, Motion, Twist, Wrench
 
 Cells = Sequence[Cell]
 

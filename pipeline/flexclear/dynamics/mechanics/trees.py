@@ -27,6 +27,7 @@ from flexclear.dynamics.vectors import (
     ZERO,
     Inertia,
     Matrix,
+    Motion,
     Symmetric,
     Twist,
     Vector,
@@ -44,17 +45,6 @@ MASSLESS = 1e-14
 
 
 Numbers = Sequence[Any]
-
-
-class Motion(NamedTuple):
-    """Motion of a frame in the world, in its axes. alpha, a: without the part from unknown rates of speeds."""
-
-    R_WB: Matrix
-    p_WB: Vector
-    omega: Vector
-    v: Vector
-    alpha: Vector
-    a: Vector
 
 
 class Site(NamedTuple):

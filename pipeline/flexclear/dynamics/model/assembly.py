@@ -11,15 +11,13 @@ from flexclear.dynamics.drives.pieces import Pieces
 from flexclear.dynamics.model import fitting, given_start
 from flexclear.dynamics.model.chain import path_positions
 from flexclear.dynamics.model.closing import CLOSED_EXACTLY, close, ill_fitting, misfit, opposite
-from flexclear.dynamics.model.constraints import Constraint, constraints
-from flexclear.dynamics.model.driving import joint_type
+from flexclear.dynamics.model.constraints import Constraint, constraints, joint_positions, moved_frame
 from flexclear.dynamics.model.flexible_bodies import start_place
 from flexclear.dynamics.model.laws import NO_LAWS
 from flexclear.dynamics.model.mechanism import Link, Mechanism
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.placing import Assembly, ambiguity, assemblies, guess, targets
 from flexclear.dynamics.model.start_table import Given, given_coordinates
-from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.system.errors import InputError
 
 
@@ -41,7 +39,8 @@ def assemble(mechanism: Mechanism, given: Mapping[str, Pieces] = NO_LAWS, *, exa
     wrong = ill_fitting(mechanism, joints, poses) or opposite(joints, poses)
     search = free and not mechanism.has_paths and (wrong is not None or bool(starts))
     judged = between if search else joints
-    wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
+    if search:
+        wrong = ill_fitting(mechanism, judged, poses) or opposite(judged, poses)
     if wrong is not None:
         raise wrong
     contradicted = given_start.contradictions(mechanism, joints, poses, given)
@@ -125,12 +124,7 @@ def _massless_link_pose(
     """Return the pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
     assert link.inboard is not None
     F = settled_poses[link.inboard.link].of(start_place(mechanism, link.inboard))
-    if not link.joint.positions:
-        return F
-    value = float(chain_positions(mechanism, link, poses)[0])
-    if link.kind == "revolute":
-        return F.of(Placement(R=rotation_vector_to_matrix(np.array([0.0, 0.0, value]))))
-    return F.of(Placement(np.array([0.0, 0.0, value])))
+    return moved_frame(link.kind, F, chain_positions(mechanism, link, poses) if link.joint.positions else [])
 
 
 def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]) -> np.ndarray:
@@ -149,8 +143,7 @@ def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]
     if link.on_path:
         whole = path_positions(edge, G.R, G.p + mechanism.origin)
     else:
-        relative = at(edge.frame_a).inverse().of(G)
-        whole = joint_type(edge.kind).coordinates(relative.R, relative.p)
+        whole = joint_positions(edge.kind, at(edge.frame_a), G)
     return np.asarray(joint.sign * whole[list(joint.positions)])
 
 

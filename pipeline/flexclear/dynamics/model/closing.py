@@ -12,7 +12,7 @@ from flexclear.dynamics.model.constraints import Constraint
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.mechanism import Link, Mechanism
 from flexclear.dynamics.model.merge import Placement
-from flexclear.numerics.rotations import rotation_vector_to_matrix, skew
+from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.system.errors import InputError
 
 if TYPE_CHECKING:
@@ -115,15 +115,12 @@ def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Place
     values, blocks, row = [], list[tuple[np.ndarray, int, int]](), 0
     centres = [pose.of(Placement(_centre(link))).p for link, pose in zip(mechanism.links, poses, strict=True)]
     for joint in joints:
-        for demanded in (joint.demands(poses), *([joint.prescribed(poses)] if joint.values else [])):
-            (residual, wrench), force = demanded, ~demanded.turning
-            values.append(np.where(force, residual / L, residual))
-            for link, sign in ((joint.link_a, -1.0), (joint.link_b, 1.0)):
-                moment = wrench[:, :3] - wrench[:, 3:] @ skew(centres[link]).T
-                block = sign * np.hstack([np.where(force[:, None], moment / L, moment), wrench[:, 3:]])
-                if link:  # the ground does not move
-                    blocks.append((block, row, 6 * (link - 1)))
-            row += len(wrench)
+        demanded = joint.demands(poses, joint.values).natural(L)
+        values.append(demanded.residuals)
+        for link, sign in ((joint.link_a, -1.0), (joint.link_b, 1.0)):
+            if link:  # the ground does not move
+                blocks.append((sign * demanded.about(centres[link], L), row, 6 * (link - 1)))
+        row += len(demanded.residuals)
     return Misfit(np.concatenate([*values, np.zeros(0)]), blocks, 6 * (len(mechanism.links) - 1))
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from flexclear.dynamics.drives.pieces import Pieces
+from flexclear.dynamics.joints.conditions import condition, measure, rows
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.flexible_bodies import start_place
 from flexclear.dynamics.model.laws import NO_LAWS, drive_laws
@@ -16,22 +18,35 @@ from flexclear.dynamics.model.mechanism import Link, Mechanism
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.start_table import Given
 from flexclear.dynamics.model.tree import PATH, Edge
+from flexclear.numerics.rotations import skew
+
+NO_VALUES: Mapping[int, float] = MappingProxyType({})
 
 
 class Demands(NamedTuple):
-    """Residuals (n,) [m or -] of a joint, and the wrenches (n, 6) (moment about the origin, force) that resist them.
+    """Residuals (n,) [m, rad or -] of a joint, and wrenches (n, 6), moment and force, about its second frame's origin.
 
-    The rate of a residual is its wrench times the twist of B relative to A (angular velocity; velocity of the point at
-    the origin).
+    A wrench resists its residual, whose rate is its power on the motion of the second frame relative to the first.
     """
 
     residuals: np.ndarray
     wrenches: np.ndarray
+    origin: np.ndarray
 
     @property
     def turning(self) -> np.ndarray:
         """True for each residual that is an angle, not a length, shape (n,)."""
         return ~np.any(self.wrenches[:, 3:] != 0.0, axis=1)
+
+    def natural(self, length: float) -> Demands:
+        """Return residuals and wrenches in radians and in the mechanism's size."""
+        unit = np.where(self.turning, 1.0, length)
+        return Demands(self.residuals / unit, self.wrenches / unit[:, None], self.origin)
+
+    def about(self, p: np.ndarray, length: float = 1.0) -> np.ndarray:
+        """Return moments about another point, and forces times a length, shape (n, 6)."""
+        force = self.wrenches[:, 3:]
+        return np.hstack([self.wrenches[:, :3] + force @ skew(self.origin - p).T, length * force])
 
 
 @dataclass(frozen=True)
@@ -53,13 +68,9 @@ class Constraint:
         """Name of the joint."""
         return self.edge.name
 
-    def demands(self, poses: Sequence[Placement]) -> Demands:
-        """Return residuals and wrenches of the joint, without those of its drives."""
-        return demands(self.edge.kind, *self.frames(poses))
-
-    def prescribed(self, poses: Sequence[Placement]) -> Demands:
-        """Return residuals and wrenches of the coordinates that have prescribed `values`."""
-        return coordinate_demands(self.edge.kind, *self.frames(poses), self.values)
+    def demands(self, poses: Sequence[Placement], values: Mapping[int, float] = NO_VALUES) -> Demands:
+        """Return residuals and wrenches of the joint, then of coordinates with prescribed values."""
+        return demands(self.edge.kind, *self.frames(poses), values)
 
     def frames(self, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
         """Return both frames in the world, from the poses of all links."""
@@ -67,10 +78,9 @@ class Constraint:
 
     def coordinates(self, poses: Sequence[Placement]) -> dict[tuple[str, int], float]:
         """Return the joint coordinates [m or rad], by the joint's name and their numbers."""
-        A, B = self.frames(poses)
-        declared, relative = joint_type(self.edge.kind), A.inverse().of(B)
-        now = declared.coordinates(relative.R, relative.p)
-        return {(self.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
+        F, G = (frame.pose for frame in self.frames(poses))
+        declared = joint_type(self.edge.kind).COORDINATES
+        return {(self.name, k): float(measure(one.gauge, F, G)[0]) for k, one in enumerate(declared)}
 
 
 def constraints(
@@ -101,50 +111,35 @@ def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
     return Placement() if frame is None or not link.flexible else start_place(mechanism, mechanism.site(frame))
 
 
-def demands(kind: str, A: Placement, B: Placement) -> Demands:
-    """Return residuals and wrenches of a joint between two frames, without its drives."""
-    declared = joint_type(kind)
-    residuals, wrenches = [], []
-    for k in declared.TRANSLATIONS:
-        along = A.R[:, k]
-        residuals.append(along @ (B.p - A.p))
-        wrenches.append([*_cross(B.p, along), *along])
-    for k, other in declared.ROTATIONS:
-        residuals.append(A.R[:, k] @ B.R[:, other])
-        wrenches.append([*_cross(B.R[:, other], A.R[:, k]), 0.0, 0.0, 0.0])
-    return Demands(np.array(residuals), np.array(wrenches).reshape(-1, 6))
-
-
-def coordinate_demands(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> Demands:
-    """Return residuals and wrenches of those coordinates of a joint that have prescribed values."""
-    declared, relative = joint_type(kind), A.inverse().of(B)
-    now = declared.coordinates(relative.R, relative.p)
-    residuals, wrenches = [], []
+def demands(kind: str, A: Placement, B: Placement, values: Mapping[int, float] = NO_VALUES) -> Demands:
+    """Return residuals and wrenches of a joint between two frames, then of its coordinates with prescribed values."""
+    declared, F, G = joint_type(kind), A.pose, B.pose
+    conditions = [condition(F, G, *row) for row in rows(declared)]
     for k, value in values.items():
         coordinate = declared.COORDINATES[k]
-        along, miss = (A, B)[coordinate.side].R[:, coordinate.axis], float(now[k]) - value
-        if coordinate.turning:
-            miss = (miss + np.pi) % (2.0 * np.pi) - np.pi
-            wrenches.append([*along, 0.0, 0.0, 0.0])
-        else:
-            wrenches.append([*_cross(B.p, along), *along])
-        residuals.append(miss)
-    return Demands(np.array(residuals), np.array(wrenches).reshape(-1, 6))
+        now, wrench = measure(coordinate.gauge, F, G)
+        miss = now - value
+        conditions.append(((miss + np.pi) % (2.0 * np.pi) - np.pi if coordinate.turning else miss, wrench))
+    wrenches = np.array([[*wrench.moment, *wrench.force] for _, wrench in conditions])
+    return Demands(np.array([residual for residual, _ in conditions]), wrenches.reshape(-1, 6), B.p)
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """Return the vector product; numpy's own costs fifty times as much for one pair, and thousands are needed."""
-    ax, ay, az = a.tolist()
-    bx, by, bz = b.tolist()
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+def joint_positions(kind: str, F: Placement, G: Placement) -> np.ndarray:
+    """Return the positions of a joint between two frames."""
+    declared, relative = joint_type(kind), F.inverse().of(G)
+    if len(declared.COORDINATES) < len(declared.POSITIONS):
+        return np.asarray(declared.coordinates(relative.R, relative.p))
+    return np.array([float(measure(one.gauge, F.pose, G.pose)[0]) for one in declared.COORDINATES])
 
 
-def freedoms(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
-    """Return free motions of B relative to A: axes of rotations about B's origin (turns, 3), and of slides (slides, 3).
+def moved_frame(kind: str, F: Placement, x: Sequence[float] | np.ndarray) -> Placement:
+    """Return the second frame of a joint at its positions."""
+    relative = joint_type(kind).motion(x, x)
+    return F.of(Placement(np.array(relative.p_FG), np.reshape(relative.R_FG, (3, 3))))
 
-    Both sets are orthonormal; rotations come first in the joint's speeds.
-    """
-    declared, (_, wrenches) = joint_type(kind), demands(kind, A, B)
-    turning = wrenches[len(declared.TRANSLATIONS) :, :3]
-    turns = np.linalg.svd(turning)[2][len(turning) :] if len(turning) else np.eye(3)
-    return np.asarray(turns), A.R.T[[k for k in range(3) if k not in declared.TRANSLATIONS]]
+
+def unit_motions(kind: str, F: Placement, G: Placement) -> tuple[np.ndarray, np.ndarray]:
+    """Return rotation and displacement of the second frame of a joint per unit of each speed, (speeds, 3) each."""
+    x = joint_positions(kind, F, G).tolist()
+    S = np.array(joint_type(kind).motion(x, [0.0] * 6).S).reshape(-1, 2, 3) @ F.R.T
+    return S[:, 0], S[:, 1]

@@ -12,7 +12,7 @@ from flexclear.dynamics.model.closing import close
 from flexclear.dynamics.model.constraints import Constraint, demands
 from flexclear.dynamics.model.mechanism import Mechanism, build
 from flexclear.dynamics.model.merge import Placement
-from flexclear.numerics.rotations import matrix_to_quaternion, rotation_vector_to_matrix, skew
+from flexclear.numerics.rotations import matrix_to_quaternion, rotation_vector_to_matrix
 from flexclear.scene.parts import FRAME_ERROR, RigidBody
 
 
@@ -106,10 +106,8 @@ def _fitting_frame(joint: Constraint, poses: Sequence[Placement], far: bool) -> 
     A, B = joint.frames(poses)
     # steps of Newton's method for the frame of a joint; they converge quadratically from the errors of a mesh
     for _ in range(5):
-        residual, wrench = demands(joint.edge.kind, A, B)
-        here = B if far else A
-        moment = wrench[:, :3] - wrench[:, 3:] @ skew(here.p).T
-        step = np.linalg.pinv(np.hstack([moment, wrench[:, 3:]])) @ residual * (-1.0 if far else 1.0)
+        demanded, here = demands(joint.edge.kind, A, B), B if far else A
+        step = np.linalg.pinv(demanded.about(here.p)) @ demanded.residuals * (-1.0 if far else 1.0)
         there = Placement(here.p + step[3:], rotation_vector_to_matrix(step[:3]) @ here.R)
         A, B = (A, there) if far else (there, B)
     return B if far else A

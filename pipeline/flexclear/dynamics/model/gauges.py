@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan2
 
 import numpy as np
 
+from flexclear.dynamics.joints.conditions import Gauge, frame_motion, measure
 from flexclear.dynamics.joints.coordinate import Coordinate
 
 
@@ -29,8 +29,7 @@ class Gauges:
     def add(self, a: int, b: int, coordinate: Coordinate, *, counts: bool) -> int:
         """Add a gauge of a joint coordinate between sites, return its index; counts: count full turns of an angle."""
         turns = self.states(1, a, b) if counts and coordinate.turning else -1
-        how = (coordinate.side, coordinate.axis, *coordinate.sine, *coordinate.cosine)
-        self.rows.append((a, b, turns, int(coordinate.turning), *how))
+        self.rows.append((a, b, turns, *coordinate.gauge))
         return len(self.rows) - 1
 
     def states(self, number: int, a: int, b: int) -> int:
@@ -54,14 +53,8 @@ def values(gauges: np.ndarray, sites: np.ndarray, internal: np.ndarray) -> list[
     """Return the coordinates [rad or m] of gauges, with full turns from internal states; arguments as of `angles`."""
     entries = []
     for row in gauges:
-        a, b = sites[row["a"]], sites[row["b"]]
-        if row["turning"]:
-            sine = float(a["axes"][:, row["sine_f"]] @ b["axes"][:, row["sine_g"]])
-            cosine = float(a["axes"][:, row["cosine_f"]] @ b["axes"][:, row["cosine_g"]])
-            angle = atan2(sine, cosine)
-            turns = round((internal[row["turns"]] - angle) / (2.0 * np.pi)) if row["turns"] >= 0 else 0
-            entries.append(angle + 2.0 * np.pi * turns)
-        else:
-            along = (b if row["side"] else a)["axes"][:, row["axis"]]
-            entries.append(float(along @ (b["origin"] - a["origin"])))
+        how = Gauge(*(int(row[name]) for name in Gauge._fields))
+        value = float(measure(how, *(frame_motion(sites[row[end]]) for end in "ab"))[0])
+        turns = round((internal[row["turns"]] - value) / (2.0 * np.pi)) if row["turns"] >= 0 else 0
+        entries.append(value + 2.0 * np.pi * turns)
     return entries

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model.driving import named_coordinate
 from flexclear.dynamics.model.merge import Placement
@@ -33,12 +31,6 @@ class Side:
     def value(self, poses: Sequence[Placement]) -> float:
         """Return the coordinate [rad in (-pi, pi], or m] at poses of the links."""
         return self.coordinate.value(*(poses[site.link].of(site.placement) for site in (self.a, self.b)))
-
-    def along(self, poses: Sequence[Placement]) -> np.ndarray:
-        """Return the axis of the coordinate, shape (3,)."""
-        site = self.b if self.coordinate.side else self.a
-        axis: np.ndarray = poses[site.link].of(site.placement).R[:, self.coordinate.axis]
-        return axis
 
 
 @dataclass(frozen=True)

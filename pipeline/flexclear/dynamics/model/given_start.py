@@ -98,7 +98,7 @@ def given_links(mechanism: Mechanism) -> set[int]:
 
 def _contradictions_of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Contradiction]:
     now, kind = joint.coordinates(poses), joint.edge.kind
-    differences = joint.prescribed(poses).residuals
+    differences = joint.demands(poses, joint.values).residuals[-len(joint.values) :]
     for (k, value), difference in zip(joint.values.items(), differences, strict=True):
         coordinate, named = joint_type(kind).COORDINATES[k], label(joint.name, kind, k)
         drive = joint.edge.drives[k] if joint.edge.drives else None

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.joints.conditions import along, frame_motion
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model import bushings
 from flexclear.dynamics.model.assembly import chain_positions
-from flexclear.dynamics.model.constraints import outboard_place
+from flexclear.dynamics.model.constraints import joint_positions, outboard_place
 from flexclear.dynamics.model.driving import joint_type
 from flexclear.dynamics.model.flexible_bodies import second_first_moment, shift, start_place
 from flexclear.dynamics.model.gauges import angles
@@ -55,8 +56,7 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
         return chain_positions(mechanism, link, starts)
     assert link.inboard is not None
     F = starts[link.inboard.link].of(start_place(mechanism, link.inboard))
-    relative = F.inverse().of(link.start.of(outboard_place(mechanism, link)))
-    return np.asarray(joint_type(link.kind).coordinates(relative.R, relative.p))
+    return joint_positions(link.kind, F, link.start.of(outboard_place(mechanism, link)))
 
 
 @dataclass(frozen=True)
@@ -80,12 +80,7 @@ class Rate:
         if self.speed is not None:
             return self.sign * float(u[self.speed])
         assert self.coordinate is not None
-        a, b = sites[self.sites[0]], sites[self.sites[1]]
-        along = self.coordinate.along(a, b)
-        if self.coordinate.turning:
-            return float(along @ (b["omega"] - a["omega"]))
-        arm = b["origin"] - a["origin"]
-        return float(along @ (b["velocity"] - a["velocity"] - np.cross(a["omega"], arm)))
+        return float(along(self.coordinate.gauge, (), *(frame_motion(sites[k]) for k in self.sites)).rate)
 
 
 def given_rates(model: Model) -> list[Rate]:

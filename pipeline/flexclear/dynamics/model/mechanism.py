@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from flexclear.dynamics.joints.conditions import rows
 from flexclear.dynamics.model.chain import InboardJoint, chain, path_pose
 from flexclear.dynamics.model.components import Components, components, coupled_frames
 from flexclear.dynamics.model.driving import joint_type, prescribed_coordinates
@@ -66,8 +67,7 @@ class Closure(NamedTuple):
     @property
     def rows(self) -> list[tuple[int, int, int]]:
         """Rows of the table CLOSURE_ROWS."""
-        declared = joint_type(self.edge.kind)
-        return [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
+        return rows(joint_type(self.edge.kind))
 
 
 class Contact(NamedTuple):

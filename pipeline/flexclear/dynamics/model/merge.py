@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from flexclear.dynamics.joints.conditions import Pose
+from flexclear.dynamics.vectors import Matrix, Vector
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from flexclear.scene.registry import suggestion
@@ -34,6 +36,11 @@ class Placement:
     def point(self, p: np.ndarray) -> np.ndarray:
         """Return a point, given in this frame, in this frame's parent."""
         return np.asarray(self.p + self.R @ p)
+
+    @property
+    def pose(self) -> Pose:
+        """The pose as vectors of plain numbers, which joints' functions take."""
+        return Pose(Matrix(self.R.ravel().tolist()), Vector(self.p.tolist()))
 
     def inverse(self) -> Placement:
         """Return the pose of the parent in this frame."""

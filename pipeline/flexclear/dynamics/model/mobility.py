@@ -20,7 +20,7 @@ from flexclear.dynamics.model.constraints import constraints
 from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.model.rates import Rates, motions, rates, row_axes
+from flexclear.dynamics.model.rates import Rates, motions, natural_wrenches, rates
 from flexclear.numerics.rotations import rotation_vector_to_matrix
 from flexclear.system.errors import InputError
 
@@ -91,7 +91,7 @@ def analyse(model: Model) -> Mobility:
     _refuse_locked(model, mobility, here)
     _refuse_contradiction(model, here)
     if here.rank < model.nv and model.mechanism.all_rigid:
-        _refuse_weightless(model, poses, motions(model, poses).twists, here.free)
+        _refuse_weightless(model, poses, here.free)
     return mobility
 
 
@@ -142,12 +142,22 @@ def _singular_start(model: Model, here: Rates) -> str:
 
 def _poses_after_motion(model: Model, poses: Sequence[Placement], motion: np.ndarray) -> list[Placement]:
     """Return the poses after a small motion of the tree's free coordinates."""
-    numbering, twists, moved = model.numbering, motions(model, poses).twists, [poses[0]]
-    for i in range(1, len(poses)):
-        route = [(c, col) for c, col in numbering.joint_route(i) if c < numbering.nv]
-        twist = sum((motion[c] * twists[col] for c, col in route), np.zeros(6))
-        turn = rotation_vector_to_matrix(twist[:3])
-        moved.append(Placement(turn @ poses[i].p + twist[3:], turn @ poses[i].R))
+    twists = _link_motions(model, poses) @ motion
+    turns, shifts = map(rotation_vector_to_matrix, twists[:, :3]), model.length * twists[:, 3:]
+    return [Placement(R @ pose.p + p, R @ pose.R) for pose, R, p in zip(poses, turns, shifts, strict=True)]
+
+
+def _link_motions(model: Model, poses: Sequence[Placement]) -> np.ndarray:
+    """Return the twists of all links about the origin per free coordinate, with lengths in the mechanism's size.
+
+    Shape (links, 6, nv).
+    """
+    twists = motions(model, poses).twists / ([1.0] * 3 + [model.length] * 3)
+    moved = np.zeros((len(model.links), 6, model.nv))
+    for i in range(1, len(moved)):
+        for coordinate, column in model.numbering.joint_route(i):
+            if coordinate < model.nv:
+                moved[i, :, coordinate] = twists[column]
     return moved
 
 
@@ -161,10 +171,10 @@ def _self_stressed(model: Model, here: Rates, poses: Sequence[Placement]) -> fro
     joints, row = set[str](), 0
     for closure in model.closures:
         stress = self_stresses[:, row : row + len(closure.rows)]
-        for acts in row_axes(closure, poses, L):
-            wrench = acts.wrenches(L).T @ stress.T
-            carried[acts.a.link] -= wrench
-            carried[acts.b.link] += wrench
+        for a, b, acting in natural_wrenches(closure, poses, L):
+            wrench = acting.about(np.zeros(3), L).T @ stress.T
+            carried[a.link] -= wrench
+            carried[b.link] += wrench
         if not isinstance(closure, Coupling) and np.max(np.abs(stress), initial=0.0) > CARRIES:
             joints.add(closure.name)
         row += len(closure.rows)
@@ -219,20 +229,15 @@ def moves(model: Model, name: str) -> bool:
     return bool(np.any(values[:, 1:] != 0.0) or np.ptp(values[:, 0]) > 0.0 or np.any(harmonics > 0))
 
 
-def _refuse_weightless(model: Model, poses: Sequence[Placement], twists: np.ndarray, free: np.ndarray) -> None:
+def _refuse_weightless(model: Model, poses: Sequence[Placement], free: np.ndarray) -> None:
     """Raise InputError when rigid bodies can move without any of their masses moving.
 
-    twists: unit motions of every column of the numbering, (columns, 6); free: motions of the free coordinates with all
-    closures closed, (nv, mobility).  Flexible bodies are left to the engine, whose mass matrix includes their modes.
+    free: motions of the free coordinates with all closures closed, (nv, mobility).  Flexible bodies are left to the
+    engine, whose mass matrix includes their modes.
     """
-    links, nv, L = model.links, model.nv, model.length
-    moved, momenta, even = (np.zeros((len(links), 6, nv)) for _ in range(3))
-    for i in range(1, len(links)):
-        for coordinate, column in model.numbering.joint_route(i):
-            if coordinate < nv:
-                moved[i, :, coordinate] = twists[column] / ([1.0] * 3 + [L] * 3)
-    moving = moved.copy()
-    for i, link in enumerate(links[1:], start=1):
+    nv, L, moved = model.nv, model.length, _link_motions(model, poses)
+    moving, momenta, even = moved.copy(), np.zeros_like(moved), np.zeros_like(moved)
+    for i, link in enumerate(model.links[1:], start=1):
         if link.inertia is not None:
             mass, com, inertia = link.inertia
             turning, R = moved[i, :3], poses[i].R

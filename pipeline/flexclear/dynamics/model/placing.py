@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexclear.dynamics.model.closing import close, misfit, opposite
-from flexclear.dynamics.model.constraints import Constraint
+from flexclear.dynamics.model.constraints import Constraint, moved_frame
 from flexclear.dynamics.model.driving import joint_type, label
 from flexclear.dynamics.model.mechanism import Mechanism
 from flexclear.dynamics.model.merge import Placement
@@ -56,11 +56,13 @@ def assemblies(
             poses = close(mechanism, joints, here, within=within)
         if poses is None or opposite(joints, poses) is not None:
             continue
-        made = Assembly(poses, _coordinates(joints, poses))
-        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME_ASSEMBLY for other in distinct):
-            distinct.append(made)
+        assembly = Assembly(poses, _coordinates(joints, poses))
+        if all(
+            _distance(mechanism, joints, assembly.coordinates, other.coordinates) > SAME_ASSEMBLY for other in distinct
+        ):
+            distinct.append(assembly)
         # the search ends at an assembly that can move and is closer than this to all hints
-        if _freedoms(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < 0.5:
+        if _freedoms(mechanism, joints, poses) and _distance(mechanism, joints, assembly.coordinates, hints) < 0.5:
             break  # a mechanism that can move: its first assembly near the hints counts
     from_hints = [_distance(mechanism, joints, one.coordinates, hints) for one in distinct]
     nearest = min(from_hints, default=0.0)
@@ -182,20 +184,20 @@ def guess(
 def _motion(
     mechanism: Mechanism, joint: Constraint, values: Hints, random: np.random.Generator | None, spread: float
 ) -> Placement:
-    """Return the pose of a joint's second frame in its first, as a sequence of motions, one per coordinate."""
-    coordinates = joint_type(joint.edge.kind).COORDINATES
-    pose = Placement()
-    if not coordinates and random is not None and joint.edge.kind == "spherical":
-        return Placement(R=rotation_vector_to_matrix(np.pi * spread * random.normal(size=3)))
+    """Return the pose of a joint's second frame in its first."""
+    kind, x = joint.edge.kind, list[float]()
+    coordinates = joint_type(kind).COORDINATES
+    if not coordinates:
+        turn = np.pi * spread * random.normal(size=3) if random is not None and kind == "spherical" else np.zeros(3)
+        return Placement(R=rotation_vector_to_matrix(turn))
     for k, coordinate in enumerate(coordinates):
-        value, along = values.get((joint.name, k)), np.eye(3)[coordinate.axis]
+        value = values.get((joint.name, k))
         if value is None:
             value = 0.0 if random is None else float(random.uniform(-1.0, 1.0))
             # largest random slide, as a fraction of the mechanism's size
             value *= np.pi if coordinate.turning else 0.3 * mechanism.length
-        step = Placement(R=rotation_vector_to_matrix(value * along)) if coordinate.turning else Placement(value * along)
-        pose = pose.of(step)
-    return pose
+        x.append(value)
+    return moved_frame(kind, Placement(), x)
 
 
 def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> dict[tuple[str, int], float]:

@@ -15,7 +15,7 @@ from flexclear.dynamics.model.flexible_bodies import start_place
 from flexclear.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.dynamics.model.merge import Placement
 from flexclear.dynamics.model.stops import End
-from flexclear.dynamics.vectors import ZERO, Matrix, Vector
+from flexclear.dynamics.vectors import ZERO
 from flexclear.scene.loads import Gravity, SpringDamper
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import replaceable_contacts
@@ -57,8 +57,8 @@ def separations(mechanism: Mechanism) -> Iterator[Separation]:
             yield Separation(contact, joint.sense * beyond, np.zeros(3), inner)
         else:
             surfaces = SURFACES[joint.type]
-            axes, p = Matrix(outer.R.ravel().tolist()), Vector((inner.p - outer.p).tolist())
-            gap, *_, offset = surfaces.separation(joint, axes, p, ZERO)
+            (axes, a), (_, b) = outer.pose, inner.pose
+            gap, *_, offset = surfaces.separation(joint, axes, b - a, ZERO)
             yield Separation(contact, -float(gap), np.array(offset), inner)
 
 

@@ -20,12 +20,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from flexclear.dynamics import memory as m
-from flexclear.dynamics.model.constraints import demands, freedoms, outboard_place
+from flexclear.dynamics.joints.conditions import measure
+from flexclear.dynamics.model.constraints import Demands, demands, outboard_place, unit_motions
 from flexclear.dynamics.model.gears import Coupling
 from flexclear.dynamics.model.index_tables import closure_route, uncommon
 from flexclear.dynamics.model.interface_basis import frame_index
@@ -106,59 +106,38 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
     J, sizes = (np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), speeds)) for _ in range(2))
     first = 0
     for closure in model.closures:
-        for acts in row_axes(closure, poses, L):
-            mine, factor = slice(first, first + len(acts.factor)), acts.factor
-            route = uncommon(closure_route(numbering, numbering.site(acts.a), numbering.site(acts.b)))
-            for coordinate, column, sign in route:
-                turn, arm = motion.turn[column], acts.point - motion.at[column]
-                shift = motion.shift[column] + np.cross(turn, arm)
-                moved = np.where(acts.turning, acts.directions @ turn, acts.directions @ shift)
-                J[mine, coordinate] += sign * factor * moved
-                angle = float(np.linalg.norm(turn))
-                # least arm of a rotation, in units of the mechanism's size: positions are not more exact at smaller
-                # distances
-                way = float(np.linalg.norm(motion.shift[column])) + angle * (np.linalg.norm(arm) + L * 1e-3)
-                sizes[mine, coordinate] += np.abs(factor) * np.where(acts.turning, angle, way)
+        mine = slice(first, first + len(closure.rows))
+        for a, b, acting in natural_wrenches(closure, poses, L):
+            route = uncommon(closure_route(numbering, numbering.site(a), numbering.site(b)))
+            coordinate, column, sign = np.array(route, dtype=np.int64).reshape(-1, 3).T
+            turn, shift, arm = motion.turn[column], motion.shift[column], acting.origin - motion.at[column]
+            moment, force = acting.wrenches[:, :3], acting.wrenches[:, 3:]
+            moved = moment @ turn.T + force @ (shift + np.cross(turn, arm)).T
+            np.add.at(J[mine].T, coordinate, (sign * moved).T)
+            angle = np.linalg.norm(turn, axis=1)
+            # least arm of a rotation, in units of the mechanism's size: positions are not more exact at smaller
+            # distances
+            way = np.linalg.norm(shift, axis=1) + angle * (np.linalg.norm(arm, axis=1) + L * 1e-3)
+            size = np.outer(np.linalg.norm(moment, axis=1), angle) + np.outer(np.linalg.norm(force, axis=1), way)
+            np.add.at(sizes[mine].T, coordinate, size.T)
         first += len(closure.rows)
     by_row, by_column = scales(sizes)
     J *= by_row[:, None] * by_column
     return Rates(J[:, : model.nv], J[:, model.nv :], by_row, by_column)
 
 
-class RowAxes(NamedTuple):
-    """Rows of a closure between two sites a and b: each a rotation about a direction, or a displacement along one.
-
-    directions: unit vector of each row where the loop is closed, (rows, 3).  turning: True for rotations, (rows,).
-    factor: of a row's radian or metre, (rows,).  point: origin of b.
-    """
-
-    a: Site
-    b: Site
-    directions: np.ndarray
-    turning: np.ndarray
-    factor: np.ndarray
-    point: np.ndarray
-
-    def wrenches(self, length: float) -> np.ndarray:
-        """Return moment about the mechanism's origin, in units of force times size, and force; (rows, 6)."""
-        along = np.where(self.turning[:, None], 0.0, self.directions)
-        moment = np.where(self.turning[:, None], self.directions, np.cross(self.point, along))
-        return self.factor[:, None] * np.hstack([moment, length * along])
-
-
-def row_axes(closure: Closure | Coupling, poses: Sequence[Placement], length: float) -> list[RowAxes]:
-    """Return the rows of a closure, in radians or the mechanism's size, for each pair of sites that it acts on."""
+def natural_wrenches(
+    closure: Closure | Coupling, poses: Sequence[Placement], length: float
+) -> list[tuple[Site, Site, Demands]]:
+    """Return the wrenches of a closure's rows, in radians or the mechanism's size, by the sites that they act on."""
     frames = [(poses[a.link].of(a.placement), poses[b.link].of(b.placement)) for a, b in closure.ends]
-    if isinstance(closure, Coupling):
-        unit = 1.0 if closure.second.coordinate.turning else length
-        sides = zip(closure.ends, closure.parts, frames, strict=True)
-        return [
-            RowAxes(*ends, side.along(poses)[None], np.array([side.coordinate.turning]), np.array([factor / unit]), B.p)
-            for ends, (side, factor), (_, B) in sides
-        ]
-    demanded, (_, B) = demands(closure.edge.kind, *frames[0]), frames[0]
-    directions = np.where(demanded.turning[:, None], demanded.wrenches[:, :3], demanded.wrenches[:, 3:])
-    return [RowAxes(*closure.ends[0], directions, demanded.turning, np.where(demanded.turning, 1.0, 1.0 / length), B.p)]
+    if isinstance(closure, Closure):
+        return [(*closure.ends[0], demands(closure.edge.kind, *frames[0]).natural(length))]
+    sides, unit = list[tuple[Site, Site, Demands]](), 1.0 if closure.second.coordinate.turning else length
+    for ends, (side, factor), (A, B) in zip(closure.ends, closure.parts, frames, strict=True):
+        wrench = measure(side.coordinate.gauge, A.pose, B.pose)[1] * (factor / unit)
+        sides.append((*ends, Demands(np.zeros(1), np.array([[*wrench.moment, *wrench.force]]), B.p)))
+    return sides
 
 
 def motions(model: Model, poses: Sequence[Placement]) -> Motions:
@@ -169,11 +148,9 @@ def motions(model: Model, poses: Sequence[Placement]) -> Motions:
         if link.inboard is None:
             continue
         F, G = poses[link.inboard.link].of(link.inboard.placement), poses[i].of(outboard_place(mechanism, link))
-        turns, slides = freedoms(link.kind, F, G)
-        first = numbering.coordinates[i].start
-        middle = first + len(turns)
-        turn[first:middle], shift[middle : middle + len(slides)] = turns, mechanism.length * slides
-        at[first : middle + len(slides)] = G.p
+        turns, slides = unit_motions(link.kind, F, G)
+        mine = slice(numbering.coordinates[i].start, numbering.coordinates[i].start + len(turns))
+        turn[mine], shift[mine], at[mine] = turns, mechanism.length * slides, G.p
     for site, frame, first in numbering.ports:
         on = numbering.sites[site].link
         mine, moving = slice(first, first + len(numbering.moving(on))), numbering.bases[on].moving

@@ -89,12 +89,12 @@ def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Pl
     result = []
     for joint in joints:
         away, turned = np.zeros(3), 0.0
-        for demanded in (joint.demands(poses), joint.prescribed(poses)):
-            for value, wrench in zip(*demanded, strict=True):
-                if np.any(wrench[3:]):
-                    away = away + value * wrench[3:]
-                else:
-                    turned = max(turned, float(abs(value)))
+        residuals, wrenches, _ = joint.demands(poses, joint.values)
+        for value, wrench in zip(residuals, wrenches, strict=True):
+            if np.any(wrench[3:]):
+                away = away + value * wrench[3:]
+            else:
+                turned = max(turned, float(abs(value)))
         # residuals below these are rounding of a closed mechanism: as a fraction of its size, and an angle [rad]
         if np.linalg.norm(away) > 1e-8 * mechanism.length or turned > 1e-7:
             end = joint.frames(poses)[1].p + mechanism.origin

@@ -6,8 +6,10 @@ import numpy as np
 
 from flexclear.artifacts.coordinates import motion
 from flexclear.dynamics.equations.observation import Observed, Series
+from flexclear.dynamics.joints.conditions import frame_motion, measure
 from flexclear.dynamics.model.gears import Coupling, Side
 from flexclear.dynamics.model.model import Model
+from flexclear.dynamics.vectors import Twist
 
 
 def gear_series(model: Model, seen: Observed) -> Series:
@@ -48,8 +50,7 @@ def _sites(model: Model, seen: Observed, side: Side) -> tuple[np.ndarray, np.nda
 
 
 def _force(model: Model, seen: Observed, c: int, coupling: Coupling) -> np.ndarray:
-    wrench = seen.closure_wrenches[:, c]
-    acting = wrench["moment" if coupling.second.coordinate.turning else "force"]
-    along = coupling.second.coordinate.along(*_sites(model, seen, coupling.second))
-    size: np.ndarray = np.einsum("ti,ti->t", along, acting)
+    moment, force = (seen.closure_wrenches[:, c][part].T for part in ("moment", "force"))
+    frames = map(frame_motion, _sites(model, seen, coupling.second))
+    size: np.ndarray = measure(coupling.second.coordinate.gauge, *frames)[1].on(Twist(moment, force))
     return size

@@ -6,6 +6,7 @@ import numpy as np
 
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.equations.observation import Observed
+from flexclear.dynamics.joints.conditions import along, frame_motion, second_rate
 from flexclear.dynamics.joints.coordinate import Coordinate
 from flexclear.dynamics.model.driving import joint_type, label
 from flexclear.dynamics.model.gears import Coupling
@@ -51,21 +52,6 @@ def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
 
 def _loop_coordinate(a: np.ndarray, b: np.ndarray, coordinate: Coordinate) -> Series:
     """Return the coordinate of a loop-closing joint from the frames of its two sites, named fields over the rows."""
-    F, G = a["axes"], b["axes"]
-    along = (G if coordinate.side else F)[:, :, coordinate.axis]
-    omega, turning = a["omega"], b["omega"] - a["omega"]
-    if coordinate.turning:
-        R = np.einsum("tki,tkj->tij", F, G)
-        (i, j), (k, l) = coordinate.sine, coordinate.cosine
-        angle = np.unwrap(np.arctan2(R[:, i, j], R[:, k, l]))
-        swing = np.cross((b if coordinate.side else a)["omega"], along)
-        return angle, _dot(along, turning), _dot(along, b["alpha"] - a["alpha"]) + _dot(swing, turning)
-    r, v, acceleration = (b[name] - a[name] for name in ("origin", "velocity", "acceleration"))
-    slide = v - np.cross(omega, r)
-    second = acceleration - np.cross(a["alpha"], r) - np.cross(omega, np.cross(omega, r) + 2.0 * slide)
-    return _dot(along, r), _dot(along, slide), _dot(along, second)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    product: np.ndarray = np.einsum("ti,ti->t", a, b)
-    return product
+    gauge, F, G = coordinate.gauge, frame_motion(a), frame_motion(b)
+    value, rate, _ = along(gauge, (), F, G)
+    return np.unwrap(value) if coordinate.turning else value, rate, second_rate(gauge, F, G)

@@ -17,11 +17,11 @@ from flexclear.dynamics.mechanics.modes import Block, Modes
 from flexclear.dynamics.mechanics.of_topology import mechanism_of
 from flexclear.dynamics.mechanics.record import moving_parts
 from flexclear.dynamics.mechanics.tables import Tables
-from flexclear.dynamics.mechanics.trees import Motion, on_body
+from flexclear.dynamics.mechanics.trees import on_body
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.routines.numbers import Numbers
 from flexclear.dynamics.specialise.topology import topology_of
-from flexclear.dynamics.vectors import ZERO, Vector, Wrench
+from flexclear.dynamics.vectors import ZERO, Motion, Vector, Wrench
 
 if TYPE_CHECKING:
     from flexclear.dynamics.run.evaluation.engine import Engine
