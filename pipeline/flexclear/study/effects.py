@@ -6,7 +6,7 @@ more members until its change is decided, within a budget.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from flexclear.scene import variants
@@ -41,9 +41,11 @@ def bring(scene: Scene, workplace: Workplace, members: int = MEMBERS[0], of: Seq
     setting, runs = setting_of(scene, workplace), Members(workplace, chosen)
     made = {gone: _without(scene, effects, gone, setting) for gone in requested(effects)}
     runs.points(made, members)
+    again = {gone: _without(scene, effects, gone, setting, tight=True) for gone in made if gone in runs.refused}
+    runs.points(again, members)
     params = {"effects": [[e.name, e.kind, e.within, e.joint] for e in effects], "members": members}
     errors = integrated(scene, setting)
-    return workplace.made(effect_study.task("effects", scene, chosen, made, runs.tasks, errors, **params))[0]
+    return workplace.made(effect_study.task("effects", scene, chosen, made | again, runs.tasks, errors, **params))[0]
 
 
 def rank(
@@ -64,25 +66,25 @@ def rank(
     effects, chosen = _examined(scene, of)
     removed, (setting, seconds) = _removed(scene, effects, IDEAL), own
     levels = levels if scene.contacts() or scene.stops() else (0,)
-    full, tight = frozenset[str](), False
+    full, tight = frozenset[str](), set[Hashable]()
+    runs, sets = Members(workplace, chosen, budget, seconds), (full, *removed.values())
+
+    def more(members: int, points: Mapping[Names, Point]) -> Collection[Names]:
+        pairs = {gone: Pair(points[full], point, members) for gone, point in points.items() if gone}
+        return [gone for gone, pair in pairs.items() if undecided_quantities(pair, chosen)]
+
     while True:
-        runs, sets = Members(workplace, chosen, budget, seconds), (full, *removed.values())
-        made = {gone: _without(scene, effects, gone, setting, tight=tight) for gone in sets}
-
-        def more(members: int, points: Mapping[Names, Point]) -> Collection[Names]:
-            pairs = {gone: Pair(points[full], point, members) for gone, point in points.items() if gone}
-            return [gone for gone, pair in pairs.items() if undecided_quantities(pair, chosen)]
-
+        made = {gone: _without(scene, effects, gone, setting, tight=gone in tight) for gone in sets}
         reached = runs.until_decided(made, levels, more)
-        if tight or not runs.refused:
+        if runs.refused <= tight:
             break
-        tight = True  # members run at the scene's own tolerance, since the looser one for means was refused
+        tight |= runs.refused  # what a tighter tolerance does not mend either is refused
     pairs = {name: reached[gone] for name, gone in removed.items() if gone in reached}
     words = {effect.name: effect.words for effect in effects} | {IDEAL: IDEAL}
     if removed.get(IDEAL) in [gone for name, gone in removed.items() if name != IDEAL]:
         words[IDEAL] = ""  # is listed as that effect
     left = ", ".join(words[name] for name in removed if name not in pairs and words[name])
-    ran, errors = {gone: made[gone] for gone in (full, *reached)}, integrated(scene, setting, tight=tight)
+    ran, errors = {gone: made[gone] for gone in (full, *reached)}, integrated(scene, setting)
     params = {"removed": {name: sorted(removed[name]) for name in pairs}, "pairs": pairs, "words": words}
     task = effect_study.task("effect_ranking", scene, chosen, ran, runs.tasks, errors, undone=left, **params)
     return workplace.made(task)[0]

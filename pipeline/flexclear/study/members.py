@@ -18,7 +18,7 @@ from flexclear.scene.solver import of_run
 from flexclear.stages import kernels, simulation, watched_quantities
 from flexclear.stages.effect_study import Integrated
 from flexclear.stages.graph import Graph
-from flexclear.study.cost_design import Design, Setting, neighbours
+from flexclear.study.cost_design import TIGHTEST, Design, Setting, neighbours
 from flexclear.workflow.task import Task
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Members:
 
     chosen: the watched quantities. own: processor time of the scene's own run [s], which predicts the first ones.
     tasks: by variant, one for each batch of members. seconds: processor time of a run of each variant [s]. known:
-    number of members of each variant. refused: True once the solver refused a variant.
+    number of members of each variant. refused: variants that the solver refused.
     """
 
     workplace: Workplace
@@ -68,7 +68,7 @@ class Members:
     tasks: dict[Hashable, list[Task]] = field(default_factory=dict)
     seconds: dict[Hashable, float] = field(default_factory=dict)
     known: dict[Hashable, int] = field(default_factory=dict)
-    refused: bool = False
+    refused: set[Hashable] = field(default_factory=set)
 
     def until_decided(
         self,
@@ -100,7 +100,9 @@ class Members:
 
     def _predict(self, name: Hashable, scene: Scene, members: int) -> float:
         """Return the predicted processor time of the members of a variant that have not run [s]."""
-        runs = members - self.known.get(name, 0) if scene.contacts() or scene.stops() else 1
+        runs = (
+            max(members - self.known.get(name, 0), 0) if scene.contacts() or scene.stops() else name not in self.known
+        )
         return runs * self.seconds.get(name, self.own) + POINT
 
     def points(self, variants: Mapping[Name, Scene], members: int) -> dict[Name, Point]:
@@ -116,10 +118,13 @@ class Members:
             last = stored[-1].attrs
             self.tasks[name] = [batch.task for batch in batches]
             self.seconds[name] = float(last["cpu_seconds"]) / float(last["members"])
-            self.budget.spent += self._predict(name, variants[name], members) + float(last["compile_seconds"])
-            self.known[name] = members
+            if max(members, 1) > self.known.get(name, 0):
+                self.budget.spent += self._predict(name, variants[name], members) + float(last["compile_seconds"])
+            self.known[name] = max(members, self.known.get(name, 1))
             points[name] = point_of_members(stored, variants[name].owners(), self.chosen)
-            self.refused = self.refused or bool(points[name].refused)
+            if points[name].refused and name not in self.refused:
+                self.refused.add(name)
+                del self.known[name], self.seconds[name]  # of a run that is repeated
         return points
 
 
@@ -179,23 +184,26 @@ def tighter(scene: Scene, own: Setting, others: Iterable[Quantity] = ()) -> Task
     return point(design, names_of(scene, others), kernels.task(first, Graph(first, shown=False).bodies()))
 
 
-def integrated(scene: Scene, own: Setting, *, tight: bool = False) -> Integrated:
-    """Return the runs from which the error of members' integration follows; tight: as of `with_setting`."""
+def integrated(scene: Scene, own: Setting) -> Integrated:
+    """Return the runs from which the error of members' integration follows."""
     task = tighter(scene, own)
     if task is None:
         return Integrated({})
-    rtol = with_setting(scene, own, tight=tight).solver.rtol
+    rtol = with_setting(scene, own).solver.rtol
     return Integrated(
         {"own": Graph(scene, shown=False).simulate, "tight": task}, rtol / own.rtol if own.step is None else 1.0
     )
 
 
 def with_setting(variant: Scene, setting: Setting, *, tight: bool = False) -> Scene:
-    """Return a variant with the method and tolerance of its scene's own run. tight: also where means need no more than
-    MEANS."""
+    """Return a variant with the method and tolerance of its scene's own run, or MEANS where means need no more.
+
+    tight: with a tenth of that run's tolerance or half its step.
+    """
     if setting.step is not None:
-        return variant
+        return edited(variant, {"solver.step": 0.5 * setting.step}) if tight else variant
     rigid = setting.integrator == VIBRATING and not variant.flexible()
-    means = (variant.contacts() or variant.stops()) and not tight
+    means = variant.contacts() or variant.stops()
     rtol = max(setting.rtol, MEANS) if means else setting.rtol
+    rtol = max(0.1 * setting.rtol, TIGHTEST) if tight else rtol
     return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})

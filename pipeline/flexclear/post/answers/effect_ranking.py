@@ -28,9 +28,11 @@ from flexclear.artifacts.points import Point
 from flexclear.post.answers.effect_sizes import (
     MEANING_NOT_COMPARABLE,
     NOT_COMPARABLE,
+    REFUSED,
     cell,
     format_difference,
     join_names,
+    reasons,
     with_early_changes,
 )
 from flexclear.post.overview.curves import format_to_digits, in_unit, size_of
@@ -118,9 +120,10 @@ def assemble(
         "quantity": [q.name for q in chosen],
         "unit": ("quantity", list(units)),
     }
-    refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
-    text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why and words[name])
-    result = xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
+    refused = {"with all effects": full.refused}
+    refused |= {f"without {words[name]}": pair.without.refused for name, pair in pairs.items() if words[name]}
+    attributes = {"Conventions": "CF-1.11", "refused": reasons(refused), "undone": undone}
+    result = xr.Dataset(data, coordinates, attributes)
     return with_early_changes(result, begun)
 
 
@@ -169,6 +172,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
     last = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
+    last += [f"{REFUSED}, {line}." for line in result.attrs["refused"].split("\n") if line]
     last += filter(None, [result.attrs.get("staying", "")])
     if not single.sizes["effect"]:
         return " ".join(last) or "The scene has no effect that can be removed."
@@ -181,7 +185,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     reached = single["horizon"].values[np.isfinite(single["horizon"].values)]
     certain, possible = _called_for(single, limits)
     needs = f"model {join_names(certain)}" if certain else "no effect is certain to be needed"
-    needs = needs if certain or possible else "no effect is needed"
+    needs = needs if certain or possible or result.attrs["refused"] else "no effect is needed"
     beyond = " beyond the horizon" if reached.size else ""
     sentences = [f"For {name}, {needs}{f' (undecided{beyond}: {join_names(possible)})' if possible else ''}."]
     sentences += [_parts(single, reached)] if reached.size else []
@@ -214,12 +218,12 @@ def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
 
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
     """Return effects whose change certainly exceeds its limit, up to the horizon or beyond it, and effects whose change
-    may exceed it by chance."""
+    may exceed it by chance; none of those whose variant was refused."""
     change, chance = single["dropped"].values, single["dropped_uncertainty"].values
     early, doubt = single["early"].values, single["early_uncertainty"].values
     certain = np.any((change > limits) & (change >= REAL * chance), axis=1)
     certain |= np.any((early > limits) & (early >= REAL * doubt), axis=1)
-    possible = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
+    possible = np.any(change + chance > limits, axis=1)
     words = [str(w) for w in single["words"].values]
     return [w for w, hit in zip(words, certain, strict=True) if hit], [
         w for w, hit in zip(words, possible & ~certain, strict=True) if hit
@@ -262,7 +266,7 @@ def table(result: xr.Dataset) -> Table:
     notes = ["Largest change of each quantity without the effect. The number after ± or < may be due to chance."]
     if np.isfinite(result["horizon"].values).any():
         notes.append("Up to the horizon, all runs of a variant are one motion: ± or < is due to starts and time steps.")
-    notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
+    notes += [f"{REFUSED}, {line}" for line in result.attrs["refused"].split("\n") if line]
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     return Table(
         "Effect sizes",

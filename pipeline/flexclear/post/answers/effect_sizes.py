@@ -32,6 +32,8 @@ NOT_COMPARABLE = "not comparable"
 MEANING_NOT_COMPARABLE = (
     "Not comparable: the quantity exists only with the effect, or the runs differ in their number of impacts."
 )
+#: beginning of a sentence on a variant without values
+REFUSED = "Refused by the solver, also at a tighter tolerance"
 #: variables of the dataset, and their meaning
 MEANINGS = {
     "dropped": "change of the quantity when the effect, or both effects, are removed from the full scene",
@@ -113,9 +115,14 @@ def assemble(
     for name, text in MEANINGS.items():
         result[name].attrs = {"long_name": text}
         result[f"{name}_uncertainty"].attrs = {"long_name": f"{text}: part that may be due to chance"}
-    refused = {"+".join(sorted(gone)) or "full": p.refused for gone, p in points.items() if p.refused}
-    why = "\n".join(f"without {gone}: {why}" for gone, why in refused.items())
-    return with_early_changes(result, begun).assign_attrs(refused=why)
+    names = {gone: f"without {'+'.join(sorted(gone))}" if gone else "with all effects" for gone in points}
+    why = {names[gone]: point.refused for gone, point in points.items()}
+    return with_early_changes(result, begun).assign_attrs(refused=reasons(why))
+
+
+def reasons(refused: Mapping[str, str]) -> str:
+    """Return a line for each variant, in words, that the solver refused, from the reasons."""
+    return "\n".join(f"{variant}: {' '.join(why.split())}" for variant, why in refused.items() if why)
 
 
 def with_early_changes(result: xr.Dataset, begun: Sequence[tuple[float, Sequence[Influence]]]) -> xr.Dataset:
@@ -174,7 +181,7 @@ def table(dataset: xr.Dataset) -> Table:
         "effects together minus the sum of their single changes.",
         "For runs with contacts, the number after ± may be due to chance (Student's t of the members' means).",
     ]
-    notes += [f"Refused: {line}" for line in filter(None, dataset.attrs["refused"].split("\n"))]
+    notes += [f"{REFUSED}, {line}" for line in dataset.attrs["refused"].split("\n") if line]
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     notes += filter(None, [dataset.attrs.get("staying")])
     notes += ["Up to the horizon all runs of a variant are one motion."] if until else []
@@ -261,7 +268,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                     shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
                 )
                 for y, value, chance in zip(rows, values, by_chance, strict=True):
-                    text = "not examined" if np.isnan(value) else _cell(value, chance, unit)
+                    text = "refused" if np.isnan(value) and kind != "early" else _cell(value, chance, unit)
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")
