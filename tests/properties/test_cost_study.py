@@ -9,7 +9,7 @@ import xarray as xr
 from flexclear.artifacts import quantities
 from flexclear.post.cost import study as cost_study
 from flexclear.post.cost import work_precision
-from flexclear.post.cost.study import Point, assemble, is_resolved
+from flexclear.post.cost.study import Point, assemble, cheapest, is_resolved, price_list, sentences, with_reference
 from flexclear.scene.quantity import Quantity
 from flexclear.system.errors import SolverError
 
@@ -139,6 +139,17 @@ def test_a_study_of_which_every_run_is_refused_says_so():
     table = cost_study.price_list(found, "t")
     assert all(row[1] == "cannot be reached" for row in table.rows)
     assert any("Not confirmed: other was refused" in note for note in table.notes)
+
+
+def test_a_run_that_no_other_confirms_has_an_unknown_error_and_none_is_cheaper():
+    alone = {"as it is": run(0.0), "same": run(0.0)}
+    points = [Point("as it is", "own", {}), Point("same", "tolerance", {"adaptive_integrator": "dop853", "rtol": 1e-7})]
+    found = assemble(with_reference(points, alone, [POSITION]), alone, [POSITION])
+    found.attrs |= {"own_integrator": "dop853", "own_rtol": 1e-7, "own_seconds": 0.4, "own_evaluations": 5e4}
+    text = sentences(found)
+    assert text.endswith("(50000 evaluations). The integration's error is unknown: no other run is known.")
+    assert cheapest(found, 1e-3) is None
+    assert all("inf at best" in row for row in price_list(found, "t").rows)
 
 
 def test_a_study_without_its_reference_is_refused_with_the_reason():

@@ -118,7 +118,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
         data[f"distance_by_{group}"] = ((*factors, "quantity"), distance)
         data |= {f"{name}_by_{group}": (factors, over(partial(cost, name=name))) for name in COSTS}
     if asis is not None and "refused" not in asis.attrs:
-        data["own_error"] = (("quantity",), errors(asis) + np.nan_to_num(floor))
+        data["own_error"] = (("quantity",), _with_uncertainty(errors(asis), floor))
     attributes = {
         "reference": _keys_of(points, "reference"),
         "confirmation": _keys_of(points, "confirmation"),
@@ -195,6 +195,11 @@ def relative_errors(
     }
 
 
+def _with_uncertainty(error: np.ndarray, uncertain: np.ndarray) -> np.ndarray:
+    """Return errors next to the reference with its uncertainty; nan for the reference that no run confirms."""
+    return np.where(np.isnan(uncertain) & (error == 0.0), np.nan, error + np.nan_to_num(uncertain))
+
+
 def comparable_until(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
     """Return the time up to which pointwise errors mean something [s]: the least horizon of the runs.
 
@@ -237,7 +242,12 @@ def _own_method_sentence(study: xr.Dataset) -> str:
     whole = horizon == "none" or horizon >= study.attrs["end"]
     until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
-        return f"{took} The integration's error is unknown: other runs{until} have another number of impacts."
+        why = (
+            f"other runs{until} have another number of impacts"
+            if study.attrs["confirmation"]
+            else "no other run is known"
+        )
+        return f"{took} The integration's error is unknown: {why}."
     return f"{took} The integration errs at the outputs{until} by {error:.1e} of the {of} at most."
 
 
@@ -317,14 +327,14 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 def choices(study: xr.Dataset) -> list[Choice]:
     """Return all ways to integrate whose error is known."""
     choices = []
-    uncertain = study["reference_uncertainty"].fillna(0.0)
+    uncertain = study["reference_uncertainty"].values
     for group, method, setting, mine in methods(study):
         for s in study[setting].values:
             one = mine.sel({setting: s})
-            error = one[f"error_by_{group}"] + uncertain
+            error = _with_uncertainty(one[f"error_by_{group}"].values, uncertain)
             if not np.isfinite(error).all():
                 continue
-            worst = str(study["quantity"].values[int(np.argmax(error.values))])
+            worst = str(study["quantity"].values[int(np.argmax(error))])
             evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
             unit = " s" if setting == "step" else ""
             choices.append(Choice(f"{method}, {setting} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))

@@ -129,8 +129,9 @@ def _panel(
         ax.set(yscale="linear", yticks=[])  # no errors to scale
         ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
     elif bound > 0.0:
-        ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
-        ax.set_ylim(bottom=0.3 * bound)
+        lowest = 0.3 * min([bound, *(m.error[name] for m in marks if m.error.get(name, 0.0) > 0.0)])
+        ax.axhspan(lowest, bound, color=GRID, zorder=0)
+        ax.set_ylim(bottom=lowest)
     ax.set(xlabel="CPU time of the integration (s)", ylabel="relative error")
 
 
