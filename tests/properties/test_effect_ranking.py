@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from flexclear.artifacts.points import Point
+from flexclear.post.answers import effect_sizes
 from flexclear.post.answers.effect_ranking import (
     IDEAL,
     Pair,
@@ -18,6 +19,7 @@ from flexclear.post.answers.effect_ranking import (
 )
 from flexclear.post.answers.effect_sizes import chart, staying_contacts_sentence
 from flexclear.scene.quantity import Quantity
+from flexclear.scene.variants import Effect
 
 VELOCITY = Quantity("slider", "velocity")
 TIME = np.linspace(0.0, 1.0, 201)
@@ -202,3 +204,23 @@ def test_the_error_of_the_integration_bounds_what_is_decided_up_to_the_horizon()
     found = assemble({"weak": pair}, {"weak": "weak"}, [VELOCITY], ["m/s"], "", TIME, lambda quantity, until: 2e-3)
     assert float(found["early"][0, 0]) == 0.0
     assert float(found["early_uncertainty"][0, 0]) == pytest.approx(9e-3, rel=1e-2)  # 5 mm/s and 2 mm/s of each run
+
+
+@pytest.mark.parametrize("refused", [False, True])
+def test_effects_are_removed_and_added_alone_and_the_rest_of_both_is_their_interaction(refused: bool):
+    """0 m/s without effects, 0.1 with one, 0.2 with the other, 0.35 with both."""
+    one, other = Effect("load.a", "load", "", ""), Effect("load.b", "load", "", "")
+    both = frozenset({one.name, other.name})
+    velocities = {frozenset[str](): 0.35, frozenset({one.name}): 0.2, frozenset({other.name}): 0.1, both: 0.0}
+    points = {gone: point(velocity) for gone, velocity in velocities.items()}
+    if refused:
+        points[both] = Point({}, {}, {}, 0, "it jams")
+    found = effect_sizes.assemble([one, other], [VELOCITY], points, 0, ["m/s"])
+    by_hand = {"dropped": [0.15, 0.25], "added": [0.1, 0.2]}
+    for name, values in by_hand.items():
+        alone = found[name].values[[0, 1], [0, 1], 0]
+        assert np.isnan(alone).all() if refused and name == "added" else alone == pytest.approx(values)
+    interaction = found["interaction"].values[0, 1, 0]
+    assert np.isnan(interaction) if refused else interaction == pytest.approx(0.35 - 0.1 - 0.2)
+    told = [note for note in effect_sizes.table(found).notes if "it jams" in note]
+    assert told == refused * ["Refused by the solver, also at a tighter tolerance, without load.a+load.b: it jams"]

@@ -87,23 +87,22 @@ class Members:
             rest = self.budget.seconds - self.budget.spent - self._predict(full, variants[full], members)
             chosen = list[Name]()
             for name in waiting:
-                rest -= self._predict(name, variants[name], members)
-                if rest >= 0.0 or not (reached or chosen):
+                more = self._predict(name, variants[name], members)
+                rest -= more
+                if rest >= 0.0 or not more or not (reached or chosen):
                     chosen.append(name)
             if not chosen:
                 break
             points = self.points({name: variants[name] for name in (full, *chosen)}, members)
             reached |= dict.fromkeys(chosen, members)
-            more = undecided(members, points)
-            waiting = [name for name in chosen if name in more]
+            still = undecided(members, points)
+            waiting = [name for name in chosen if name in still]
         return reached
 
     def _predict(self, name: Hashable, scene: Scene, members: int) -> float:
         """Return the predicted processor time of the members of a variant that have not run [s]."""
-        runs = (
-            max(members - self.known.get(name, 0), 0) if scene.contacts() or scene.stops() else name not in self.known
-        )
-        return runs * self.seconds.get(name, self.own) + POINT
+        runs = (members if scene.contacts() or scene.stops() else 1) - self.known.get(name, 0)
+        return runs * self.seconds.get(name, self.own) + POINT if runs > 0 else 0.0
 
     def points(self, variants: Mapping[Name, Scene], members: int) -> dict[Name, Point]:
         """Return the points of variants over this number of members; of one run where a variant has no contacts."""
@@ -118,8 +117,8 @@ class Members:
             last = stored[-1].attrs
             self.tasks[name] = [batch.task for batch in batches]
             self.seconds[name] = float(last["cpu_seconds"]) / float(last["members"])
-            if max(members, 1) > self.known.get(name, 0):
-                self.budget.spent += self._predict(name, variants[name], members) + float(last["compile_seconds"])
+            if predicted := self._predict(name, variants[name], members):
+                self.budget.spent += predicted + float(last["compile_seconds"])
             self.known[name] = max(members, self.known.get(name, 1))
             points[name] = point_of_members(stored, variants[name].owners(), self.chosen)
             if points[name].refused and name not in self.refused:

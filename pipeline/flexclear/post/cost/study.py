@@ -242,11 +242,8 @@ def _own_method_sentence(study: xr.Dataset) -> str:
     whole = horizon == "none" or horizon >= study.attrs["end"]
     until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
-        why = (
-            f"other runs{until} have another number of impacts"
-            if study.attrs["confirmation"]
-            else "no other run is known"
-        )
+        why = f"other runs{until} have another number of impacts"
+        why = why if study.attrs["confirmation"] else "no other run is known"
         return f"{took} The integration's error is unknown: {why}."
     return f"{took} The integration errs at the outputs{until} by {error:.1e} of the {of} at most."
 
