@@ -14,7 +14,7 @@ from flexclear.dynamics.compile import sources
 from flexclear.dynamics.drives.pieces import Pieces, jump, pieces_of
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import tabulate
-from flexclear.scene.laws import Expression, Harmonic, Step
+from flexclear.scene.laws import Expression, Harmonic, Polynomial, Step
 from flexclear.scene.load import edited, load_scene, scene_of
 from flexclear.scene.schema import Scene
 from flexclear.scene.units import quantity
@@ -211,6 +211,7 @@ def test_a_sine_that_is_written_out_is_the_built_in_law() -> None:
 def test_a_sign_for_degrees_is_a_unit(degrees: str) -> None:
     assert law(f"a * sin(w * t + {degrees})") == law("a * sin(w * t + 30 deg)")
     assert quantity(degrees, "angle") == pytest.approx(np.pi / 6.0, rel=1e-15)
+    assert pieces_of(Polynomial(type="polynomial", coefficients=[degrees]), "angle") == law(degrees, "angle")
 
 
 def test_products_of_sines_and_kinks_have_exact_rates() -> None:

@@ -146,6 +146,16 @@ def test_a_study_without_a_run_that_can_be_its_reference_is_refused_with_the_rea
         study(**dict.fromkeys(("best", "other", "d0", "d1", "d2"), REFUSED))
 
 
+def test_a_run_that_no_other_confirms_has_an_unknown_error_and_none_is_cheaper():
+    runs = {cost_study.OWN: run(0.0), "same": run(0.0)}
+    found = assemble([MeasuredRun("same", "dop853", rtol=1e-7)], runs, [POSITION])
+    found.attrs |= {"own_integrator": "dop853", "own_rtol": 1e-7, "own_seconds": 0.4, "own_evaluations": 5e4}
+    text = cost_study.sentences(found)
+    assert text.endswith("(50000 evaluations). The integration's error is unknown: no other run is known.")
+    assert cost_study.cheapest(found, 1e-3) is None
+    assert all("inf at best" in row for row in cost_study.price_list(found, "t").rows)
+
+
 def test_the_pareto_front_holds_what_nothing_beats():
     seconds, error = np.array([1.0, 2.0, 3.0, 4.0, np.nan]), np.array([1e-2, 1e-1, 1e-4, 1e-3, 1e-9])
     assert work_precision.pareto(seconds, error).tolist() == [0, 2]

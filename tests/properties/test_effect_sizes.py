@@ -168,11 +168,14 @@ def test_what_chance_may_hide_is_not_called_absent():
     assert "undecided: unsure" in sentence(found, {})
 
 
-def test_a_refused_variant_is_named_and_calls_for_nothing():
-    found = study(broken=Pair(point(0.0), Point({}, {}, {}, 0, "it jams"), 0))
-    assert "it jams" in found.attrs["refused"]
-    assert any("it jams" in note for note in table(found).notes)
-    assert "undecided: broken" in sentence(found, {})
+def test_a_refused_variant_is_named_with_its_reason_and_in_other_words_than_one_beyond_the_budget():
+    found = study(broken=Pair(point(0.0), Point({}, {}, {}, 0, "it jams\n  hint: oil it"), 0))
+    told = "Refused by the solver, also at a tighter tolerance, without broken: it jams hint: oil it"
+    assert told in table(found).notes
+    text = sentence(found.assign_attrs(undone="gravity"), {})
+    assert text.startswith("For errors below 1 %, no effect is certain to be needed. ")
+    assert text.endswith(f"Not examined within the budget: gravity. {told}.")
+    assert "undecided" not in text
 
 
 def test_up_to_the_horizon_a_change_is_decided_however_the_members_scatter_later():
@@ -221,3 +224,11 @@ def test_effects_that_are_added_and_combined_are_rows_of_the_same_table():
     assert rows["friction, added alone"] == ("100 mm/s", "")
     assert rows["gravity, interaction"] == ("50 mm/s, with friction", "")
     assert "added alone" in chart("c", found, "t")["c.svg"].decode()
+    points[frozenset({"one", "two"})] = Point({}, {}, {}, 0, "it jams")
+    refused = with_pairs(made, [one, two], [VELOCITY], points, 0)
+    assert np.isnan(refused["added"].values).all()
+    assert np.isnan(refused["interaction"].values).all()
+    assert (
+        "Refused by the solver, also at a tighter tolerance, without gravity and friction: it jams"
+        in table(refused).notes
+    )

@@ -2,14 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.artifacts.effect_size import POOLED, Agreement, agreement, same_starts
-from flexclear.artifacts.points import Point
+from flexclear.artifacts.effect_size import POOLED, Agreement, agreement, compared_values, same_starts
+from flexclear.artifacts.points import Point, batch
 from flexclear.commands.new import write
 from flexclear.dynamics.plan import search
 from flexclear.post.answers.effect_sizes import staying_contacts_sentence
@@ -19,7 +21,10 @@ from flexclear.scene.plan_decisions import BOUND, Decision, Plan
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene
 from flexclear.scene.variants import Effect
+from flexclear.study import effects
+from flexclear.study.cost_design import Setting
 from flexclear.study.members import MEMBERS, Budget, Members
+from flexclear.workflow.task import Task
 
 
 @pytest.mark.parametrize(
@@ -135,6 +140,35 @@ def test_verdicts_count_as_chance_what_differs_start_by_start_where_that_is_less
     assert verdict(alone) == "not decided"
     assert verdict(paired) == "met"
     assert (paired.error, paired.chance) == (pytest.approx(0.5), pytest.approx(0.0))
+
+
+@pytest.mark.parametrize("accepted", [1e-9, 0.0])
+def test_a_refused_variant_is_repeated_once_at_a_tenth_of_the_scenes_tolerance(accepted: float):
+    """Members need 1e-6 where the scene's own run has 1e-8, so a refusal may be that of the tolerance."""
+    ball = Path(__file__).parents[2] / "scenes" / "checks" / "bounce.toml"
+    scene, made = load_scene(ball, override={"view.watch": ["ball.position"]}), list[tuple[bool, float]]()
+
+    class Place:
+        def made(self, *tasks: Task) -> list[SimpleNamespace]:
+            return [SimpleNamespace(task=task, dataset=partial(self.points, task)) for task in tasks]
+
+        def points(self, task: Task) -> xr.Dataset:
+            loads, rtol = task.params["simulate"]["scene"]["load"], task.params["simulate"]["scene"]["solver"]["rtol"]
+            made.append((bool(loads), rtol))
+            refused = "" if loads or rtol <= accepted else "the energy balance is off"
+            values = {"ball.position.series": np.zeros((991, 3))}
+            point = Point({} if refused else values, {}, {}, 1, refused)
+            recorded = compared_values(scene.owners(), scene.watched_quantities())
+            spent = {"members": 4, "compile_seconds": 0.0, "cpu_seconds": 4.0}
+            return batch({"point": point}, recorded).assign_attrs(spent)
+
+    account = Budget(1e3)
+    own = Setting("dop853", 1e-8), 1.0
+    answer = effects.examine_effects(scene, Place(), (4,), ["load.gravity"], own=own, budget=account)
+    assert made == [(True, 1e-6), (False, 1e-6), (True, 1e-6), (False, 1e-9)]
+    assert answer.task.params["undone"] == ""
+    # two variants and one of them again, a member a second, and 0.6 s each
+    assert account.spent == pytest.approx(3 * 4.6)
 
 
 def test_members_are_added_until_all_is_decided_as_far_as_they_are_affordable(monkeypatch: pytest.MonkeyPatch):

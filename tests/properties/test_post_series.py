@@ -162,6 +162,12 @@ def test_horizon_is_where_members_part(run: xr.Dataset):
     assert (spread(velocity)[:at] <= 1e-3 * peak).all()
 
 
+def test_members_are_as_far_apart_as_the_body_in_which_they_differ_most():
+    velocity = np.zeros((2, 1, 3, 3))  # two members, one time, three bodies: apart by 0, 2 and 10 m/s
+    velocity[:, 0, 1, 0], velocity[:, 0, 2, 1:] = [-1.0, 1.0], [[-3.0, -4.0], [3.0, 4.0]]
+    assert spread(velocity) == pytest.approx([5.0])
+
+
 def test_horizon_of_members_that_stay_together_is_the_end(run: xr.Dataset):
     members = synthetic.ensemble(run, growth=0.0)
     assert horizon(members.time.values, members.velocity.values) == run.time.values[-1]

@@ -134,6 +134,16 @@ WRONG = {
         "",
         {"joint.B.pin_radius": ("pin_radius", "8 m is more than ten times the size of the mechanism")},
     ),
+    "a pin, a stop and a spring at once": (
+        {'pin_radius = "8 mm"': "pin_radius = 8"},
+        '[stop.end]\njoint = "guide"\nupper = 0.1\nnormal = { law = "hertz", stiffness = 1e9 }\n'
+        '[load.short]\ntype = "spring-damper"\nbetween = ["ground.O", "crank.O"]\nstiffness = 100\nfree_length = 0.1\n',
+        {
+            "joint.B.pin_radius": ("pin_radius", "8 m is more than ten times the size of the mechanism"),
+            "stop.end": ("[stop.end]", "the coordinate starts 0.136 m beyond 0.1 m"),
+            "load.short.between": ('between = ["ground.O", "crank.O"]\nst', "its two ends coincide at the start"),
+        },
+    ),
     "velocities that the joints forbid": (
         {"frames.B = {}": "frames.B = {}\nvelocity = [0, 1, 0]"},
         "",

@@ -80,9 +80,8 @@ class Step(Part):
 
 def _coefficient(value: Any) -> Any:
     """Return a number, or text with a unit, which the part that has the law checks."""
-    if isinstance(value, str) and not any(character.isalpha() for character in value):
-        return quantity(value, "number")
-    return value if isinstance(value, str) else quantity(value, "number")
+    has_unit = isinstance(value, str) and any(character.isalpha() or character == "°" for character in value)
+    return value if has_unit else quantity(value, "number")
 
 
 class Polynomial(Part):

@@ -6,7 +6,7 @@ and pairs are removed and added.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from flexclear.scene import variants
@@ -50,28 +50,33 @@ def examine_effects(
     effects, chosen = _effects_and_quantities(scene, of)
     removed, (setting, seconds) = removals(scene, effects, IDEAL), own or (setting_of(scene, workplace), 0.0)
     levels = levels if scene.contacts() or scene.stops() else (0,)
-    full, tight = frozenset[str](), False
+    full, tight = frozenset[str](), set[Hashable]()
+    runs, sets = Members(workplace, chosen, budget or Budget(), seconds), (full, *removed.values())
+
+    def variant(gone: Names) -> Scene:
+        return _without(scene, effects, gone, setting, tight=gone in tight)
+
+    def more(members: int, points: Mapping[Names, Point]) -> Collection[Names]:
+        compared = {gone: Pair(points[full], point, members) for gone, point in points.items() if gone}
+        return [gone for gone, pair in compared.items() if undecided_quantities(pair, chosen)]
+
     while True:
-        runs, sets = Members(workplace, chosen, budget or Budget(), seconds), (full, *removed.values())
-        made = {gone: _without(scene, effects, gone, setting, tight=tight) for gone in sets}
-
-        def more(members: int, points: Mapping[Names, Point]) -> Collection[Names]:
-            compared = {gone: Pair(points[full], point, members) for gone, point in points.items() if gone}
-            return [gone for gone, pair in compared.items() if undecided_quantities(pair, chosen)]
-
-        reached = runs.until_decided(made, levels, more)
-        if tight or not runs.refused:
+        reached = runs.until_decided({gone: variant(gone) for gone in sets}, levels, more)
+        if runs.refused <= tight:
             break
-        tight = True  # members run at the scene's own tolerance, since the looser one for means was refused
-    ran = {gone: made[gone] for gone in (full, *reached)}
+        tight |= runs.refused  # what a tighter tolerance does not mend either is refused
+    ran = {gone: variant(gone) for gone in (full, *reached)}
     if pairs:
-        ran |= {gone: _without(scene, effects, gone, setting, tight=tight) for gone in combined(effects)}
+        ran |= {gone: variant(gone) for gone in combined(effects)}
+        runs.points(ran, levels[-1])
+        tight |= runs.refused
+        ran = {gone: variant(gone) for gone in ran}
         runs.points(ran, levels[-1])
     members = {name: reached[gone] for name, gone in removed.items() if gone in reached}
     words = {effect.name: effect.words for effect in effects} | {IDEAL: IDEAL}
     if removed.get(IDEAL) in [gone for name, gone in removed.items() if name != IDEAL]:
         words[IDEAL] = ""  # is listed as that effect
-    errors, types = error_runs(scene, setting, tight=tight), {name: joint.type for name, joint in scene.joint.items()}
+    errors, types = error_runs(scene, setting), {name: joint.type for name, joint in scene.joint.items()}
     params = {
         "title": scene.title,
         "looser": errors.looser,

@@ -17,7 +17,7 @@ from flexclear.scene.load import edited
 from flexclear.scene.solver import of_run
 from flexclear.stages import variant_runs
 from flexclear.stages.graph import Graph
-from flexclear.study.cost_design import Setting, neighbours
+from flexclear.study.cost_design import TIGHTEST, Setting, neighbours
 from flexclear.workflow.task import Task
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Members:
 
     chosen: the watched quantities. own: processor time of the scene's own run [s], which predicts the first ones.
     tasks: by variant, one for each batch of members. seconds: processor time of a run of each variant [s]. known:
-    number of members of each variant. refused: True once the solver refused a variant.
+    number of members of each variant. refused: variants that the solver refused.
     """
 
     workplace: Workplace
@@ -77,7 +77,7 @@ class Members:
     tasks: dict[Hashable, list[Task]] = field(default_factory=dict)
     seconds: dict[Hashable, float] = field(default_factory=dict)
     known: dict[Hashable, int] = field(default_factory=dict)
-    refused: bool = False
+    refused: set[Hashable] = field(default_factory=set)
 
     def until_decided(
         self,
@@ -96,21 +96,22 @@ class Members:
             rest = self.budget.seconds - self.budget.spent - self._predict(full, variants[full], members)
             chosen = list[Name]()
             for name in waiting:
-                rest -= self._predict(name, variants[name], members)
-                if rest >= 0.0 or not (reached or chosen):
+                more = self._predict(name, variants[name], members)
+                rest -= more
+                if rest >= 0.0 or not more or not (reached or chosen):
                     chosen.append(name)
             if not chosen:
                 break
             points = self.points({name: variants[name] for name in (full, *chosen)}, members)
             reached |= dict.fromkeys(chosen, members)
-            more = undecided(members, points)
-            waiting = [name for name in chosen if name in more]
+            still = undecided(members, points)
+            waiting = [name for name in chosen if name in still]
         return reached
 
     def _predict(self, name: Hashable, scene: Scene, members: int) -> float:
         """Return the predicted processor time of the members of a variant that have not run [s]."""
-        runs = members - self.known.get(name, 0) if scene.contacts() or scene.stops() else 1
-        return runs * self.seconds.get(name, self.own) + POINT
+        runs = (members if scene.contacts() or scene.stops() else 1) - self.known.get(name, 0)
+        return runs * self.seconds.get(name, self.own) + POINT if runs > 0 else 0.0
 
     def points(self, variants: Mapping[Name, Scene], members: int) -> dict[Name, Point]:
         """Return the points of variants over this number of members; of one run where a variant has no contacts."""
@@ -125,10 +126,13 @@ class Members:
             last = stored[-1].attrs
             self.tasks[name] = [batch.task for batch in batches]
             self.seconds[name] = float(last["cpu_seconds"]) / float(last["members"])
-            self.budget.spent += self._predict(name, variants[name], members) + float(last["compile_seconds"])
-            self.known[name] = members
+            if predicted := self._predict(name, variants[name], members):
+                self.budget.spent += predicted + float(last["compile_seconds"])
+            self.known[name] = max(members, self.known.get(name, 1))
             points[name] = point_of_members(stored, variants[name].owners(), self.chosen)
-            self.refused = self.refused or bool(points[name].refused)
+            if points[name].refused and name not in self.refused:
+                self.refused.add(name)
+                del self.known[name], self.seconds[name]  # of a run that is repeated
         return points
 
 
@@ -175,23 +179,26 @@ def tighter_run(scene: Scene, own: Setting, others: Iterable[Quantity] = ()) -> 
     return variant_runs.measuring_task(design.scene, design.key, kept_names(scene, others))
 
 
-def error_runs(scene: Scene, own: Setting, *, tight: bool = False) -> ErrorRuns:
-    """Return the runs from which the error of members' integration follows; tight: as of `with_setting`."""
+def error_runs(scene: Scene, own: Setting) -> ErrorRuns:
+    """Return the runs from which the error of members' integration follows."""
     task = tighter_run(scene, own)
     if task is None:
         return ErrorRuns({})
-    rtol = with_setting(scene, own, tight=tight).solver.rtol
+    rtol = with_setting(scene, own).solver.rtol
     return ErrorRuns(
         {"own": Graph(scene, shown=False).simulate, "tight": task}, rtol / own.rtol if own.step is None else 1.0
     )
 
 
 def with_setting(variant: Scene, setting: Setting, *, tight: bool = False) -> Scene:
-    """Return a variant with the method and tolerance of its scene's own run. tight: also where means need no more than
-    MEANS."""
+    """Return a variant with the method and tolerance of its scene's own run, or MEANS where means need no more.
+
+    tight: with a tenth of that run's tolerance or half its step.
+    """
     if setting.step is not None:
-        return variant
+        return edited(variant, {"solver.step": 0.5 * setting.step}) if tight else variant
     rigid = setting.integrator == VIBRATING and not variant.flexible()
-    means = (variant.contacts() or variant.stops()) and not tight
+    means = variant.contacts() or variant.stops()
     rtol = max(setting.rtol, MEANS) if means else setting.rtol
+    rtol = max(0.1 * setting.rtol, TIGHTEST) if tight else rtol
     return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})

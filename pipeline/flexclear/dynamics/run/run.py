@@ -16,6 +16,7 @@ from flexclear.dynamics.drives.pieces import Pieces
 from flexclear.dynamics.effects import scheme_of
 from flexclear.dynamics.equations import observation
 from flexclear.dynamics.equations.observation import Blocks, Observed
+from flexclear.dynamics.model.checks import mechanism_errors
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.model.model import Model, tabulate
 from flexclear.dynamics.model.plausibility import start_errors
@@ -32,7 +33,7 @@ from flexclear.dynamics.run.trajectory import Followed, StiffError, Stop, Trajec
 from flexclear.scene.drives import PathDrive
 from flexclear.scene.load import edited
 from flexclear.scene.schema import Scene
-from flexclear.system.errors import SolverError, StoppedError, refuse
+from flexclear.system.errors import InputError, SolverError, StoppedError, errors_of, refuse
 from flexclear.system.progress import Progress
 from flexclear.workflow import stopping
 from flexclear.workflow.cores import run_in_thread
@@ -134,7 +135,12 @@ def maker(
     if known is not None and alike is not None:
         same = partial(assemble, alike, known.entry, known.method, known.mobility)
         return lambda name="", tell=progress: maker(scene, bundles, tell)(name) if name else same()
-    posed, choice = with_start_state(scene, bundles, progress)
+    try:
+        posed, choice = with_start_state(scene, bundles, progress)
+    except InputError as error:  # of a mechanism that has ideal joints, perhaps
+        both = (*mechanism_errors(scene, build(scene, bundles)), *errors_of(error))
+        refuse([*{str(one): one for one in both}.values()])
+        raise
     moved, given = with_driven_actuators(posed, bundles, progress)
     making = Lock()  # a run and its perturbed run may both continue with another integrator
 
@@ -142,7 +148,7 @@ def maker(
         requested = edited(moved, {"solver.integrator": name}) if name else moved
         with making:
             model = tabulate(build(requested, bundles), given)
-            refuse(start_errors(model.mechanism))
+            refuse([*mechanism_errors(model.scene, model.mechanism), *start_errors(model.mechanism)])
             if choice:  # the poses found no longer describe it
                 model = replace(model, mechanism=replace(model.mechanism, choice=choice))
             return prepare(model, tell)

@@ -12,6 +12,7 @@ from flexclear.artifacts.effect_size import REAL, Influence, chance
 from flexclear.post.answers.effect_sizes import (
     IDEAL,
     NOT_COMPARABLE,
+    REFUSED,
     SLIGHT,
     cell,
     format_difference,
@@ -82,6 +83,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     """
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
     last = [f"Not examined within the budget: {result.attrs['undone']}."] if result.attrs["undone"] else []
+    last += [f"{REFUSED}, {line}." for line in result.attrs["refused"].split("\n") if line]
     last += filter(None, [result.attrs.get("staying", "")])
     if not single.sizes["effect"]:
         return " ".join(last) or "The scene has no effect that can be removed."
@@ -94,7 +96,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     reached = single["horizon"].values[np.isfinite(single["horizon"].values)]
     certain, possible = _needed_effects(single, limits)
     needs = f"model {join_names(certain)}" if certain else "no effect is certain to be needed"
-    needs = needs if certain or possible else "no effect is needed"
+    needs = needs if certain or possible or result.attrs["refused"] else "no effect is needed"
     beyond = " beyond the horizon" if reached.size else ""
     sentences = [f"For {name}, {needs}{f' (undecided{beyond}: {join_names(possible)})' if possible else ''}."]
     sentences += [_parts(single, reached)] if reached.size else []
@@ -127,12 +129,12 @@ def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
 
 def _needed_effects(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
     """Return effects whose change certainly exceeds its limit, up to the horizon or beyond it, and effects whose change
-    may exceed it by chance."""
+    may exceed it by chance; none of those whose variant was refused."""
     change, chance = single["dropped"].values, single["dropped_uncertainty"].values
     early, doubt = single["early"].values, single["early_uncertainty"].values
     certain = np.any((change > limits) & (change >= REAL * chance), axis=1)
     certain |= np.any((early > limits) & (early >= REAL * doubt), axis=1)
-    possible = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
+    possible = np.any(change + chance > limits, axis=1)
     words = [str(w) for w in single["words"].values]
     return [w for w, hit in zip(words, certain, strict=True) if hit], [
         w for w, hit in zip(words, possible & ~certain, strict=True) if hit
@@ -182,7 +184,7 @@ def table(result: xr.Dataset) -> Table:
     if np.isfinite(result["horizon"].values).any():
         notes.append("Up to the horizon, all runs of a variant are one motion: ± or < is due to starts and time steps.")
     notes += [MEANING_OF_PAIRS] if "added" in result else []
-    notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
+    notes += [f"{REFUSED}, {line}" for line in result.attrs["refused"].split("\n") if line]
     notes += [MEANING_NOT_COMPARABLE] if any(NOT_COMPARABLE in row for row in rows) else []
     notes += filter(None, [result.attrs.get("staying")])
     return Table(

@@ -39,6 +39,8 @@ LEGEND = {"dropped": "removed", "added": "added alone", "early": "removed, up to
 WHISKER = 0.9
 #: words for an infinite effect size, and their meaning
 NOT_COMPARABLE = "not comparable"
+#: beginning of a sentence on a variant without values
+REFUSED = "Refused by the solver, also at a tighter tolerance"
 #: variables of the dataset, and their meaning
 MEANINGS = {
     "dropped": "change of the quantity when the effect is removed from the full scene",
@@ -137,9 +139,15 @@ def assemble(
         "quantity": [q.name for q in chosen],
         "unit": ("quantity", list(units)),
     }
-    refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
-    text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why and words[name])
-    return xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
+    refused = {"with all effects": full.refused}
+    refused |= {f"without {words[name]}": pair.without.refused for name, pair in pairs.items() if words[name]}
+    attributes = {"Conventions": "CF-1.11", "refused": _reasons(refused), "undone": undone}
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def _reasons(refused: Mapping[str, str]) -> str:
+    """Return a line for each variant, in words, that the solver refused, from the reasons."""
+    return "\n".join(f"{variant}: {' '.join(why.split())}" for variant, why in refused.items() if why)
 
 
 def _variables(kind: str, dims: Sequence[str], sizes: np.ndarray) -> dict[str, tuple]:
@@ -188,7 +196,14 @@ def with_pairs(
     variables = _variables("added", ("effect", "quantity"), added)
     for kind, sizes in data.items():
         variables |= _variables(kind, ("effect", "other", "quantity"), sizes)
-    return result.assign(variables).assign_coords(other=names)
+    words = dict(zip(names, result["words"].values.tolist(), strict=True))
+    refused = {
+        f"without {join_names([words[name] for name in names if name in gone])}": point.refused
+        for gone, point in points.items()
+        if len(gone) > 1
+    }
+    why = "\n".join(filter(None, (result.attrs["refused"], _reasons(refused))))
+    return result.assign(variables).assign_coords(other=names).assign_attrs(refused=why)
 
 
 def _interaction(both: Point, single: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:
@@ -275,7 +290,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                     shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
                 )
                 for row, (y, value) in enumerate(zip(rows, values, strict=True)):
-                    text = "not examined" if np.isnan(value) else cell(dataset, kind, (row, k))
+                    text = "refused" if np.isnan(value) and kind != "early" else cell(dataset, kind, (row, k))
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")

@@ -109,7 +109,7 @@ def assemble(points: Sequence[MeasuredRun], runs: Mapping[str, xr.Dataset], chos
         "Conventions": "CF-1.11",
     }
     if asis is not None:
-        error = relative_errors(asis, reference, chosen, until) + np.nan_to_num(floor)
+        error = _with_uncertainty(relative_errors(asis, reference, chosen, until), floor)
         words = "error of the scene's own run, the reference's uncertainty included, as a fraction of the size"
         variables["own_error"] = (("quantity",), error, {"units": "1", "long_name": words})
         attributes |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
@@ -160,6 +160,11 @@ def relative_errors(run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Qua
     return np.array([error / scale if scale > 0.0 else error for error, scale in zip(errors, scales, strict=True)])
 
 
+def _with_uncertainty(error: np.ndarray, uncertain: np.ndarray) -> np.ndarray:
+    """Return errors next to the reference with its uncertainty; nan for the reference that no run confirms."""
+    return np.where(np.isnan(uncertain) & (error == 0.0), np.nan, error + np.nan_to_num(uncertain))
+
+
 def comparable_until(runs: Mapping[str, xr.Dataset]) -> float:
     """Return the time up to which pointwise errors mean something [s]: the least horizon of the runs.
 
@@ -193,7 +198,9 @@ def _own_method_sentence(study: xr.Dataset) -> str:
     whole = horizon == "none" or horizon >= study.attrs["end"]
     until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
-        return f"{took} The integration's error is unknown: other runs{until} have another number of impacts."
+        why = f"other runs{until} have another number of impacts"
+        why = why if study.attrs["confirmation"] else "no other run is known"
+        return f"{took} The integration's error is unknown: {why}."
     return f"{took} The integration errs at the outputs{until} by {error:.1e} of the {of} at most."
 
 
@@ -269,7 +276,7 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 def choices(study: xr.Dataset) -> list[Choice]:
     """Return all ways to integrate whose error is known."""
-    errors = study["error"].values + study["reference_uncertainty"].fillna(0.0).values
+    errors = _with_uncertainty(study["error"].values, study["reference_uncertainty"].values)
     return [
         Choice(
             str(study["run"].values[k]),

@@ -97,7 +97,7 @@ def _panel(
         ax.set(yscale="linear", yticks=[])  # no errors to scale
         ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
     elif bound > 0.0:
-        ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
+        ax.axhspan(1e-30 * bound, bound, color=GRID, zorder=0)
         ax.set_ylim(bottom=0.3 * bound)
     ax.set(xlabel="CPU time of the integration (s)", ylabel="relative error")
 
@@ -109,6 +109,8 @@ def _star(ax: Axes, study: xr.Dataset) -> None:
         return
     seconds = study.attrs["own_seconds"]
     ax.plot(seconds, error, "*", color=INK, markersize=9, zorder=5)
+    if 0.0 < error < ax.get_ylim()[0]:
+        ax.set_ylim(bottom=0.3 * error)
     # its name on the side with more space
     side, shift = ("right", -4) if seconds > 0.5 * float(study["cpu_seconds"].max()) else ("left", 4)
     ax.annotate("this scene", (seconds, error), (shift, 4), textcoords="offset points", fontsize=6.8, ha=side)

@@ -17,7 +17,7 @@ from flexclear.post.plotting import style
 from flexclear.post.render import film_speed, layout, mechanism, ruler
 from flexclear.post.render.panel import panel
 from flexclear.post.render.surfaces import Surface
-from flexclear.post.render.view import ANGLE, eye
+from flexclear.post.render.view import ANGLE, eye, upright
 from flexclear.scene.quantity import Quantity
 from flexclear.system.progress import Progress, silent
 
@@ -155,7 +155,11 @@ def floor(scene: pv.Plotter, drawn: mechanism.Mechanism) -> None:
 
 
 def place_camera(scene: pv.Plotter, drawn: mechanism.Mechanism, margin: int = 0) -> None:
-    """Place the camera so that everything drawn over the run is in the picture, between its margins [pixels]."""
+    """Place lights, and the camera so that all that is drawn over the run is in the picture, between its margins
+    [pixels]."""
+    axes = np.eye(3) if drawn.view.planar else upright(drawn.view.up)
+    for light, intensity in (((-2.0, 3.0, 4.0), 0.62), ((4.0, 1.0, 2.0), 0.3), ((-1.0, -4.0, 1.0), 0.35)):
+        scene.add_light(pv.Light(position=tuple(axes @ light), intensity=intensity, light_type="scene light"))
     width, height = scene.window_size
     position, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
     scene.camera_position = [tuple(position), tuple(focus), tuple(drawn.view.up)]
@@ -169,8 +173,6 @@ def plotter(size: tuple[int, int]) -> pv.Plotter:
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     scene = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
     scene.set_background(BACKGROUND, top=BACKGROUND_TOP)
-    for position, intensity in (((-2.0, 3.0, 4.0), 0.62), ((4.0, 1.0, 2.0), 0.3), ((-1.0, -4.0, 1.0), 0.35)):
-        scene.add_light(pv.Light(position=position, intensity=intensity, light_type="scene light"))
     scene.add_light(pv.Light(light_type="headlight", intensity=0.35))
     return scene
 

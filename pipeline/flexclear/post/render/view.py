@@ -83,10 +83,15 @@ def axes_of(camera: View, position: np.ndarray, focus: np.ndarray) -> np.ndarray
 
 def _spatial(up: np.ndarray) -> View:
     """Return the view from above and in front, for any upward direction."""
+    return View(upright(up) @ SPATIAL, up, False)
+
+
+def upright(up: np.ndarray) -> np.ndarray:
+    """Return axes of which the third is `up`, columns of shape (3, 3); those of the world where that is its z."""
     side = np.eye(3)[int(np.argmin(np.abs(up) + np.array([0.0, 1e-9, 2e-9])))]
     x = side - (side @ up) * up
     x /= np.linalg.norm(x)
-    return View(np.column_stack([x, np.cross(up, x), up]) @ SPATIAL, up, False)
+    return np.column_stack([x, np.cross(up, x), up])
 
 
 def plane(run: xr.Dataset) -> np.ndarray | None:
