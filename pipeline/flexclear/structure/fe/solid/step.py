@@ -46,13 +46,13 @@ class Round:
     radius: float
     length: float
 
-    def along(self, other: Round) -> bool:
-        """Return True when two cylinders have one axis and overlap along it."""
+    def along(self, other: Round, gap: float = 0.0) -> bool:
+        """Return True when two cylinders have one axis and overlap along it, or almost, by a gap [m]."""
         offset, near = other.centre - self.centre, ALIKE * max(self.radius, other.radius)
         place = float(offset @ self.axis)
         across = float(np.linalg.norm(offset - place * self.axis))
         parallel = float(np.linalg.norm(np.cross(self.axis, other.axis))) < ALIKE
-        return parallel and across < near and abs(place) < 0.5 * (self.length + other.length) - near
+        return parallel and across < near and abs(place) < 0.5 * (self.length + other.length) + gap - near
 
 
 @dataclass(frozen=True)
@@ -159,12 +159,15 @@ def _piece(gmsh: Any, solid: int, face: int) -> tuple[Round, float]:
     length, radius = float(np.linalg.norm(end - first)), float(np.linalg.norm(first - middle))
     axis = (end - first) / length
     inner, inside = middle + 0.5 * (end - first), 0
-    for k in range(8):  # outside of a shaft is material only where something is attached
+    for k in range(
+        8
+    ):  # outside of a shaft is material where something is attached, none of a hole where another crosses
         u = low[0] + (k + 0.5) / 8.0 * (high[0] - low[0])
         surface = at(u, 0.5 * (low[1] + high[1]))
-        inside += int(gmsh.model.isInside(3, solid, (surface + 1e-3 * (surface - inner)).tolist()))
+        for side in (1.0, -1.0):
+            inside += int(side) * gmsh.model.isInside(3, solid, (surface + side * 1e-3 * (surface - inner)).tolist())
     axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
-    return Round(inside > 4, inner, axis, radius, length), float(gmsh.model.occ.getMass(2, face))
+    return Round(inside > 0, inner, axis, radius, length), float(gmsh.model.occ.getMass(2, face))
 
 
 def _merge_cylinders(pieces: list[tuple[Round, float]]) -> Iterator[Round]:
