@@ -94,8 +94,8 @@ def part(solid: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_calculix_and_this_program_have_the_same_body(part: Path, solid: xr.Dataset) -> None:
     found = kind.build(recipe(CALCULIX | {"listing": "free.dat"}), part)
     modes = solve(found, "free-free", 10)
-    # its listing has eight digits; its Lanczos iteration differs from its matrices by 4e-7
-    np.testing.assert_allclose(modes["frequency"], modes["listed_frequency"], rtol=1e-6)
+    # its listing has seven digits, and its iteration varies by 2.4e-6 with the number of its threads (1, 2, 4)
+    np.testing.assert_allclose(modes["frequency"], modes["listed_frequency"], rtol=3e-5)
     # quadratic bricks with straight sides: both programs integrate them exactly; fourteen digits in its files
     np.testing.assert_allclose(modes["frequency"], solve(solid, "free-free", 10)["frequency"], rtol=1e-9)
     data = bundle.build(found, modes)
@@ -111,7 +111,7 @@ def test_calculix_and_this_program_have_the_same_body(part: Path, solid: xr.Data
 
 
 @needs_ccx
-@pytest.mark.parametrize("units, words", [("m-kg-s", "mm-t-s"), ("mm-kg-ms", "mm-t-s")])
+@pytest.mark.parametrize("units, words", [(units, "mm-t-s") for units in ("m-kg-s", "mm-kg-ms", "in-slinch-s")])
 def test_files_in_other_units_are_refused(part: Path, units: str, words: str) -> None:
     with pytest.raises(InputError, match=rf'kg/m3 and a speed of sound.*\n.*units = "{words}"'):
         kind.build(recipe(CALCULIX, units=units), part)
@@ -285,7 +285,7 @@ def test_every_form_holds_the_same_matrices(form: str, small: xr.Dataset, tmp_pa
     np.testing.assert_allclose(np.diag(inertia), exact, rtol=1e-9)
 
 
-def test_hdf5_holds_the_arrays_of_an_npz(small: xr.Dataset, tmp_path: Path) -> None:
+def test_hdf5_holds_the_arrays_of_an_npz_in_either_byte_order(small: xr.Dataset, tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     model = of_mesh(small).assemble(small)
     files.write_npz(model, tmp_path / "body.npz")
@@ -294,8 +294,14 @@ def test_hdf5_holds_the_arrays_of_an_npz(small: xr.Dataset, tmp_path: Path) -> N
             file[name] = data[name]
     numbers = files.table(model).node
     frames = {"all": {"nodes": np.unique(numbers).tolist()}}
-    a, b = (kind.build(recipe({"file": f"body.{end}"}, frames, "m-kg-s"), tmp_path) for end in ("npz", "h5"))
-    xr.testing.assert_identical(a, b)
+    with np.load(tmp_path / "body.npz") as data, h5py.File(tmp_path / "swapped.h5", "w") as file:
+        for name in data.files:
+            file[name] = data[name].astype(data[name].dtype.newbyteorder(">"))
+    made = [
+        kind.build(recipe({"file": name}, frames, "m-kg-s"), tmp_path) for name in ("body.npz", "body.h5", "swapped.h5")
+    ]
+    xr.testing.assert_identical(made[0], made[1])
+    xr.testing.assert_identical(made[0], made[2])
 
 
 GRIDS = (
