@@ -111,9 +111,9 @@ def test_calculix_and_this_program_have_the_same_body(part: Path, solid: xr.Data
 
 
 @needs_ccx
-@pytest.mark.parametrize("units, words", [(units, "mm-t-s") for units in ("m-kg-s", "mm-kg-ms", "in-slinch-s")])
-def test_files_in_other_units_are_refused(part: Path, units: str, words: str) -> None:
-    with pytest.raises(InputError, match=rf'kg/m3 and a speed of sound.*\n.*units = "{words}"'):
+@pytest.mark.parametrize("units", ["m-kg-s", "mm-kg-ms", "in-slinch-s"])
+def test_files_in_other_units_are_refused(part: Path, units: str) -> None:
+    with pytest.raises(InputError, match=r'kg/m3 and a speed of sound.*\n.*units = "mm-t-s"'):
         kind.build(recipe(CALCULIX, units=units), part)
 
 
@@ -289,17 +289,13 @@ def test_hdf5_holds_the_arrays_of_an_npz_in_either_byte_order(small: xr.Dataset,
     h5py = pytest.importorskip("h5py")
     model = of_mesh(small).assemble(small)
     files.write_npz(model, tmp_path / "body.npz")
-    with np.load(tmp_path / "body.npz") as data, h5py.File(tmp_path / "body.h5", "w") as file:
-        for name in data.files:
-            file[name] = data[name]
-    numbers = files.table(model).node
-    frames = {"all": {"nodes": np.unique(numbers).tolist()}}
-    with np.load(tmp_path / "body.npz") as data, h5py.File(tmp_path / "swapped.h5", "w") as file:
-        for name in data.files:
-            file[name] = data[name].astype(data[name].dtype.newbyteorder(">"))
-    made = [
-        kind.build(recipe({"file": name}, frames, "m-kg-s"), tmp_path) for name in ("body.npz", "body.h5", "swapped.h5")
-    ]
+    ends = ("body.npz", "body.h5", "swapped.h5")
+    for name, order in zip(ends[1:], "=>", strict=True):
+        with np.load(tmp_path / "body.npz") as data, h5py.File(tmp_path / name, "w") as file:
+            for key in data.files:
+                file[key] = data[key].astype(data[key].dtype.newbyteorder(order))
+    frames = {"all": {"nodes": np.unique(files.table(model).node).tolist()}}
+    made = [kind.build(recipe({"file": name}, frames, "m-kg-s"), tmp_path) for name in ends]
     xr.testing.assert_identical(made[0], made[1])
     xr.testing.assert_identical(made[0], made[2])
 

@@ -106,9 +106,9 @@ ARM = """<robot name="arm">
 </robot>"""
 
 
-def _file(tmp_path: Path, text: str, name: str = "robot.xml") -> Path:
+def _file(tmp_path: Path, text: str | bytes, name: str = "robot.xml") -> Path:
     path = tmp_path / name
-    path.write_text(text)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path
 
 
@@ -324,7 +324,7 @@ def test_limits_and_laws_of_actuators_and_tendons_that_differ_are_listed(tmp_pat
 
 BODY = '<mujoco><worldbody><body name="a"><joint name="j"/><geom size=".1"/></body></worldbody></mujoco>'
 MESH = BODY.replace("<worldbody>", '<asset><mesh name="m" file="gone.stl"/></asset><worldbody>')
-REFUSED = {
+REFUSED: dict[str, tuple[str | bytes, str, str]] = {
     "cut": (BODY[:50], "is not complete XML", "copy it again"),
     "not a number": (
         BODY.replace('".1"', '"nan"'),
@@ -333,6 +333,11 @@ REFUSED = {
     ),
     "infinite": (BODY.replace('size=".1"', 'size=".1" mass="inf"'), 'mass="inf" is not a finite number', "write"),
     "entities": ('<!DOCTYPE m [<!ENTITY a "aa">]><mujoco model="&a;"/>', "declares entities", "without <!DOCTYPE"),
+    "bytes": (
+        ('<?xml version="1.0" encoding="latin-1"?>' + BODY.replace('"a"', '"\xfc"')).encode("latin-1"),
+        "is not complete XML: 'utf-8' codec can't decode",
+        "copy it again",
+    ),
     "other file": ("<svg/>", "its outermost element is <svg>", "the robot's own file"),
     "no body": ("<mujoco/>", "holds no body that moves", "own file"),
     "copies": (
