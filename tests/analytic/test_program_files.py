@@ -94,8 +94,8 @@ def part(solid: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_calculix_and_this_program_have_the_same_body(part: Path, solid: xr.Dataset) -> None:
     found = kind.build(recipe(CALCULIX | {"listing": "free.dat"}), part)
     modes = solve(found, "free-free", 10)
-    # its listing has eight digits; its Lanczos iteration differs from its matrices by 4e-7
-    np.testing.assert_allclose(modes["frequency"], modes["listed_frequency"], rtol=1e-6)
+    # its listing has seven digits, and its iteration varies by 2.4e-6 with the number of its threads (1, 2, 4)
+    np.testing.assert_allclose(modes["frequency"], modes["listed_frequency"], rtol=3e-5)
     # quadratic bricks with straight sides: both programs integrate them exactly; fourteen digits in its files
     np.testing.assert_allclose(modes["frequency"], solve(solid, "free-free", 10)["frequency"], rtol=1e-9)
     data = bundle.build(found, modes)
@@ -111,9 +111,9 @@ def test_calculix_and_this_program_have_the_same_body(part: Path, solid: xr.Data
 
 
 @needs_ccx
-@pytest.mark.parametrize("units, words", [("m-kg-s", "mm-t-s"), ("mm-kg-ms", "mm-t-s")])
-def test_files_in_other_units_are_refused(part: Path, units: str, words: str) -> None:
-    with pytest.raises(InputError, match=rf'kg/m3 and a speed of sound.*\n.*units = "{words}"'):
+@pytest.mark.parametrize("units", ["m-kg-s", "mm-kg-ms", "in-slinch-s"])
+def test_files_in_other_units_are_refused(part: Path, units: str) -> None:
+    with pytest.raises(InputError, match=r'kg/m3 and a speed of sound.*\n.*units = "mm-t-s"'):
         kind.build(recipe(CALCULIX, units=units), part)
 
 
@@ -285,17 +285,19 @@ def test_every_form_holds_the_same_matrices(form: str, small: xr.Dataset, tmp_pa
     np.testing.assert_allclose(np.diag(inertia), exact, rtol=1e-9)
 
 
-def test_hdf5_holds_the_arrays_of_an_npz(small: xr.Dataset, tmp_path: Path) -> None:
+def test_hdf5_holds_the_arrays_of_an_npz_in_either_byte_order(small: xr.Dataset, tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     model = of_mesh(small).assemble(small)
     files.write_npz(model, tmp_path / "body.npz")
-    with np.load(tmp_path / "body.npz") as data, h5py.File(tmp_path / "body.h5", "w") as file:
-        for name in data.files:
-            file[name] = data[name]
-    numbers = files.table(model).node
-    frames = {"all": {"nodes": np.unique(numbers).tolist()}}
-    a, b = (kind.build(recipe({"file": f"body.{end}"}, frames, "m-kg-s"), tmp_path) for end in ("npz", "h5"))
-    xr.testing.assert_identical(a, b)
+    ends = ("body.npz", "body.h5", "swapped.h5")
+    for name, order in zip(ends[1:], "=>", strict=True):
+        with np.load(tmp_path / "body.npz") as data, h5py.File(tmp_path / name, "w") as file:
+            for key in data.files:
+                file[key] = data[key].astype(data[key].dtype.newbyteorder(order))
+    frames = {"all": {"nodes": np.unique(files.table(model).node).tolist()}}
+    made = [kind.build(recipe({"file": name}, frames, "m-kg-s"), tmp_path) for name in ends]
+    xr.testing.assert_identical(made[0], made[1])
+    xr.testing.assert_identical(made[0], made[2])
 
 
 GRIDS = (

@@ -106,9 +106,9 @@ ARM = """<robot name="arm">
 </robot>"""
 
 
-def _file(tmp_path: Path, text: str, name: str = "robot.xml") -> Path:
+def _file(tmp_path: Path, text: str | bytes, name: str = "robot.xml") -> Path:
     path = tmp_path / name
-    path.write_text(text)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path
 
 
@@ -258,9 +258,73 @@ def test_surfaces_of_a_urdf_that_cannot_be_read_are_listed(mesh: str, why: str, 
     assert any(mesh in item and why in item for item in lost)
 
 
+def test_coupled_coordinates_start_where_their_coupling_holds(tmp_path: Path):
+    """Polynomials count from the references of both joints; the file's start, or its zero, breaks them."""
+    text = """<mujoco><compiler angle="radian"/><worldbody>
+      <body name="a"><joint name="q" axis="0 0 1" ref="0.1"/><geom size=".1"/></body>
+      <body name="b" pos="1 0 0"><joint name="r" axis="0 0 1" ref="0.7"/><geom size=".1"/></body>
+      <body name="c" pos="2 0 0"><joint name="s" type="slide"/><geom size=".1"/></body>
+      <body name="d" pos="3 0 0"><joint name="t"/><geom size=".1" pos=".1 0 0"/></body></worldbody>
+      <equality><joint joint1="s" joint2="r" polycoef="0.2 0.1 0 0 0"/>
+        <joint joint1="r" joint2="q" polycoef="0.5 -2 0 0 0"/><joint joint1="t" polycoef="0.25 0 0 0 0"/></equality>
+      <keyframe><key qpos="0.3 0 0 1" qvel="1 0 0 1"/></keyframe></mujoco>"""
+    scene, written = _scene(tmp_path, text)
+    b, starts = 0.7 + 0.5 - 2.0 * (0.3 - 0.1), {name: one[""] for name, one in scene.start.joint.items()}
+    assert [starts[name].position for name in "qrs"] == pytest.approx([0.3, b, 0.2 + 0.1 * (b - 0.7)])
+    assert [starts[name].velocity for name in "qrs"] == pytest.approx([1.0, -2.0, -0.2])
+    assert scene.drive["loop_2"].law.value == starts["t"].position == 0.25
+    assert "positions at the start follow from coupled joints: s, r" in written
+
+
+def test_what_a_file_disables_does_not_act(tmp_path: Path):
+    """Constraints, springs and dampers of tendons, one group of actuators; controls are not clipped."""
+    text = """<mujoco><option actuatorgroupdisable="2">
+      <flag constraint="disable" clampctrl="disable" spring="disable" damper="disable"/></option>
+      <worldbody><site name="top" pos="0 .1 1"/>
+      <body name="a"><joint name="j" axis="0 1 0" frictionloss=".3" range="-10 10" limited="true"/>
+        <geom size=".1" pos=".5 0 0"/><site name="end" pos=".5 0 0"/>
+        <body name="b" pos=".5 0 0"><joint name="k" axis="0 1 0"/><geom size=".1" pos=".5 0 0"/></body></body>
+      </worldbody>
+      <tendon><spatial stiffness="40" damping="2" springlength=".3">
+        <site site="top"/><site site="end"/></spatial></tendon>
+      <equality><joint joint1="j" joint2="k"/></equality>
+      <actuator><motor name="on" joint="j" ctrlrange="-1 1" ctrllimited="true"/><motor name="off" joint="k" group="2"/>
+      </actuator><keyframe><key ctrl="5 7" qpos="0.05 0.2" qvel="1 2"/></keyframe></mujoco>"""
+    ours, theirs = _accelerations(tmp_path, text, "robot.xml", ["j", "k"])
+    assert ours == pytest.approx(theirs, rel=1e-9)
+    head = (tmp_path / "scene" / "robot.toml").read_text().partition("title")[0]
+    assert "actuator off: the file disables its group 2" in head
+    assert "contacts" not in head
+
+
+def test_limits_and_laws_of_actuators_and_tendons_that_differ_are_listed(tmp_path: Path):
+    text = """<mujoco><worldbody><site name="top" pos="0 .1 1"/>
+      <body name="a" gravcomp="1"><joint name="j" axis="0 1 0" actuatorfrcrange="-2 2" actuatorgravcomp="true"/>
+        <geom size=".1" pos=".5 0 0"/><site name="end" pos=".5 0 0"/></body></worldbody>
+      <tendon><spatial name="line" stiffness="10 5"><site site="top"/><site site="end"/></spatial></tendon>
+      <actuator><motor name="one" joint="j"/>
+        <position name="half" joint="j" kp="50" forcelimited="true" forcerange="-1 inf"/>
+        <general name="grows" joint="j" dyntype="integrator" actlimited="true" actrange="-1 1"/>
+        <general name="late" site="end" gear="0 0 2 0 0 0" dyntype="filter" dynprm="0.1"/></actuator>
+      <keyframe><key ctrl="0 0 0.5 3" act="0 0"/></keyframe></mujoco>"""
+    scene, written = _scene(tmp_path, text)
+    assert scene.load["half"].limits == (-1.0, 2.0)
+    assert [one.value for one in scene.load["late"].force] == [0.0, 0.0, 6.0]
+    head = " ".join(written.partition("title")[0].replace("\n#", "").split())
+    for words in (
+        "gravity compensation of joint j is not limited with its actuators",
+        "limits of the sum of all actuators of joint j hold for each alone",
+        "limits of the activation of actuator grows: -1 to 1",
+        "limits of the force of actuator grows, which grows with time",
+        "stiffness and damping of tendon line beyond the linear term",
+        "actuator late acts at once, without its filter of 0.1 s",
+    ):
+        assert head.count(words) == 1, words
+
+
 BODY = '<mujoco><worldbody><body name="a"><joint name="j"/><geom size=".1"/></body></worldbody></mujoco>'
 MESH = BODY.replace("<worldbody>", '<asset><mesh name="m" file="gone.stl"/></asset><worldbody>')
-REFUSED = {
+REFUSED: dict[str, tuple[str | bytes, str, str]] = {
     "cut": (BODY[:50], "is not complete XML", "copy it again"),
     "not a number": (
         BODY.replace('".1"', '"nan"'),
@@ -269,6 +333,11 @@ REFUSED = {
     ),
     "infinite": (BODY.replace('size=".1"', 'size=".1" mass="inf"'), 'mass="inf" is not a finite number', "write"),
     "entities": ('<!DOCTYPE m [<!ENTITY a "aa">]><mujoco model="&a;"/>', "declares entities", "without <!DOCTYPE"),
+    "bytes": (
+        ('<?xml version="1.0" encoding="latin-1"?>' + BODY.replace('"a"', '"\xfc"')).encode("latin-1"),
+        "is not complete XML: 'utf-8' codec can't decode",
+        "copy it again",
+    ),
     "other file": ("<svg/>", "its outermost element is <svg>", "the robot's own file"),
     "no body": ("<mujoco/>", "holds no body that moves", "own file"),
     "copies": (

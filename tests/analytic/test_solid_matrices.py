@@ -178,6 +178,10 @@ def test_files_that_do_not_fit_together_are_refused(tmp_path: Path, solid: xr.Da
     (tmp_path / "unknowns.csv").write_text("\n".join(lines[:-1]))
     with pytest.raises(InputError, match=r"'stiffness.mtx' has the shape .* lines"):
         build(recipe(THREE, frames), tmp_path)
+    for line, words in (("1,0,nan,0,ux", "line 2 has a position that is not finite"), ("1,0", "line 2 has too few")):
+        (tmp_path / "unknowns.csv").write_text("\n".join([lines[0], line, *lines[2:]]))
+        with pytest.raises(InputError, match=words):
+            build(recipe(THREE, frames), tmp_path)
     (tmp_path / "unknowns.csv").write_text("node,x,y\n1,0,0\n")
     with pytest.raises(InputError, match="is not a table of unknowns"):
         build(recipe(THREE, frames), tmp_path)

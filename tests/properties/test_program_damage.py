@@ -39,6 +39,9 @@ DAMAGED: dict[str, tuple[dict[str, str | bytes], str]] = {
     "an include of itself": ({"block.inp": "*INCLUDE, INPUT=block.inp\n"}, "in a circle"),
     "no rows at all": ({"block.dof": ""}, "'block.dof'|there are 0 unknowns"),
     "an empty matrix": ({"block.sti": ""}, "'block.sti'"),
+    "a row cut": ({"block.dof": text("block.dof").rpartition(".")[0]}, "line 24 is none"),
+    "a row twice": ({"block.dof": text("block.dof").replace("8.3", "8.2")}, r"it has 8\.2 more than once"),
+    "an endless include": ({"block.inp": "*INCLUDE, INPUT=/dev/zero\n"}, "'/dev/zero' is not an ordinary file|no file"),
     "a direction of heat": ({"block.dof": text("block.dof").replace("8.3", "8.0")}, "is no motion of a node"),
 }
 

@@ -138,6 +138,7 @@ def test_differences_are_those_of_the_runs():
 )
 def test_a_value_is_written_to_the_second_digit_of_its_error(value: float, error: float, written: str):
     assert curves.format_with_error(value, error, "m") == written
+    assert curves.format_with_error(-value, error, "m") == f"-{written}"
 
 
 def test_numbers_have_an_exponent_only_where_they_need_one():

@@ -208,6 +208,8 @@ def test_wrong_values_and_a_lost_process_are_errors(tmp_path: Path, capfd: pytes
     with pytest.raises(fmpy.fmi1.FMICallException):
         slave.fmu.doStep(0.0, 5.0)
     slave.step(0.1)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        slave.fmu.doStep(0.0, 0.1)  # back in time without a stored state
     (child,) = processes() - before
     os.kill(child, signal.SIGKILL)
     with pytest.raises(fmpy.fmi1.FMICallException):
@@ -215,6 +217,7 @@ def test_wrong_values_and_a_lost_process_are_errors(tmp_path: Path, capfd: pytes
     slave.fmu.freeInstance()
     said = capfd.readouterr()
     assert "beyond the scene's end" in said.out + said.err
+    assert "a step from 0 s is asked for, but the motion is at 0.1 s" in said.out + said.err
     assert "has ended" in said.out + said.err
 
 

@@ -87,6 +87,7 @@ def test_a_comparison_shows_its_curves_and_tables(root: Path):
 def test_a_run_is_a_page_to_turn_in_a_notebook_and_in_a_file(root: Path, tmp_path: Path):
     shown = fc.show(short(root), tmp_path)
     assert (tmp_path / "motion.html").read_bytes() == shown.page
+    assert len(repr(shown)) < 100  # of a terminal, which shows no page
     (tmp_path / "notebook.html").write_text(f"<meta charset='utf-8'>{shown._repr_html_()}")
     with browser() as window:
         window.open(tmp_path / "notebook.html")

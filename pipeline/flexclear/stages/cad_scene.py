@@ -6,13 +6,14 @@ import json
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
+import numpy as np
 
+if TYPE_CHECKING:
     from flexclear.structure.fe.solid.step import Round, Solid
 
 #: steel, until the user says what the solids are made of
@@ -64,7 +65,7 @@ Place = tuple[str, "Round"]
 
 
 def _joints(names: list[str], found: list[Solid]) -> tuple[list[tuple[Place, Place]], dict[str, dict[str, Round]]]:
-    """Return pairs of coaxial cylinders of two solids, one per pair and axis, and the frames of each solid."""
+    """Return pairs of coaxial cylinders of two solids, as few per axis as connect them, and all frames."""
     frames: dict[str, dict[str, Round]] = {}
     for name, solid in zip(names, found, strict=True):
         several = {"hole": 0, "shaft": 0}
@@ -73,31 +74,48 @@ def _joints(names: list[str], found: list[Solid]) -> tuple[list[tuple[Place, Pla
             sort = "hole" if one.hole else "shaft"
             several[sort] += 1
             frames[name][f"{sort}{several[sort]}"] = one
-    joints = list[tuple[Place, Place]]()
-    for first, second in combinations(names, 2):
-        pairs = [
-            ((f"{first}.{a}", one), (f"{second}.{b}", other))
-            for a, one in frames[first].items()
-            for b, other in frames[second].items()
-            if one.along(other) and (one.hole or other.hole) and _fits_hole(one, other)
-        ]
-        # of several cylinders about one axis those that fit most closely
-        for pair in sorted(pairs, key=lambda p: abs(p[0][1].radius - p[1][1].radius)):
-            if not any(pair[0][1].along(p[0][1]) and {first, second} == _bodies(p) for p in joints):
-                joints.append(pair)
-    return joints, frames
+    pairs = [
+        ((f"{first}.{a}", one), (f"{second}.{b}", other))
+        for first, second in combinations(names, 2)
+        for a, one in frames[first].items()
+        for b, other in frames[second].items()
+        if _fits_hole(one, other)
+    ]
+    kept = list[int]()
+    # shafts before holes without any, and those first that fit most closely
+    for k in sorted(range(len(pairs)), key=lambda k: _looseness(*pairs[k])):
+        first, second = _bodies(pairs[k])
+        same_axis, reached = [_bodies(pairs[n]) for n in kept if pairs[k][0][1].along(pairs[n][0][1], np.inf)], {first}
+        for _ in same_axis:
+            reached.update(*(bodies for bodies in same_axis if reached & {*bodies}))
+        if second not in reached:
+            kept.append(k)
+    kept.sort()
+    # a joint's frames share a point of the axis, and so do those of other joints that one of them is in
+    lead = {place: k for k in reversed(kept) for place, _ in pairs[k]}
+    for first, second in [(pairs[k][0][0], pairs[k][1][0]) for k in kept] * len(kept):
+        lead[first] = lead[second] = min(lead[first], lead[second])
+    for (body, _, frame), k in ((place.partition("."), k) for place, k in lead.items()):
+        centre = next(one.centre for _, one in pairs[k] if one.hole)
+        frames[body][frame] = replace(frames[body][frame], centre=centre)
+    return [pairs[k] for k in kept], frames
 
 
-def _bodies(pair: tuple[Place, Place]) -> set[str]:
-    return {place.partition(".")[0] for place, _ in pair}
+def _bodies(pair: tuple[Place, Place]) -> list[str]:
+    return [place.partition(".")[0] for place, _ in pair]
+
+
+def _looseness(first: Place, second: Place) -> tuple[bool, float]:
+    return first[1].hole and second[1].hole, abs(first[1].radius - second[1].radius)
 
 
 def _fits_hole(one: Round, other: Round) -> bool:
-    """Return True when a shaft is not larger than its hole; two holes take one pin, if they are about alike."""
+    """Return True for a shaft in a hole that is not smaller, and for two like holes next to each other."""
     if one.hole and other.hole:
-        return abs(one.radius - other.radius) < 0.2 * max(one.radius, other.radius)
+        least, most = sorted((one.radius, other.radius))
+        return most - least < 0.2 * most and one.along(other, least)
     hole, shaft = (one, other) if one.hole else (other, one)
-    return 0.5 * hole.radius < shaft.radius < (1.0 + FIT) * hole.radius
+    return hole.hole and 0.5 * hole.radius < shaft.radius < (1.0 + FIT) * hole.radius and one.along(other)
 
 
 def _scene(

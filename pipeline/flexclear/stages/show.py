@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,7 @@ def show_start(
 class Page:
     """Result of `flexclear.show`: a page to turn, which a notebook shows."""
 
-    page: bytes
+    page: bytes = field(repr=False)
 
     def _repr_html_(self) -> str:
         """Return the page for a notebook, in a frame of its own so that its style stays there."""

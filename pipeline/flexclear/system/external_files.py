@@ -9,6 +9,7 @@ import contextlib
 import io
 import os
 import re
+import warnings
 from collections.abc import Iterator, Mapping
 from math import prod
 from pathlib import Path
@@ -63,7 +64,9 @@ def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> 
     Damaged files make readers fail in many ways. Too little memory becomes a ResourceError.
     """
     try:
-        yield
+        with warnings.catch_warnings():  # of NumPy about what is refused next
+            warnings.simplefilter("ignore", UserWarning)
+            yield
     except FlexclearError:
         raise
     except ImportError as error:  # a library that only few formats need, such as h5py

@@ -148,7 +148,7 @@ def format_to_digits(value: float, digits: int) -> str:
 
 def in_unit(value: float, unit: str, digits: int = 4) -> str:
     """Format a value [SI] in a readable unit, to so many significant digits."""
-    factor, written = readable_unit(value, unit)
+    factor, written = readable_unit(abs(value), unit)
     return f"{format_to_digits(factor * value, digits)} {written}"
 
 
@@ -159,7 +159,7 @@ def format_with_error(value: float, error: float, unit: str) -> str:
     """
     if not np.isfinite(error) or error <= 1e-4 * abs(value):
         return in_unit(value, unit)
-    factor, written = readable_unit(max(value, error), unit)
+    factor, written = readable_unit(max(abs(value), error), unit)
     value, error = factor * value, factor * error
     decimals = 1 - int(np.floor(np.log10(error)))
     if decimals > 6:

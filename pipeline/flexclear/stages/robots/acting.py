@@ -15,6 +15,8 @@ DISABLED, TRANSMISSION = mujoco.mjtDisableBit, mujoco.mjtTrn
 GAIN, BIAS, DYNAMICS = mujoco.mjtGain, mujoco.mjtBias, mujoco.mjtDyn
 #: speeds at which friction loss has its full value, of angles [rad/s] and lengths [m/s]: MuJoCo's is a constraint
 FULL_FRICTION = {True: 0.05, False: 0.01}
+#: a force [N] or torque [N m] that stands for none, where an actuator is limited on one side alone
+UNLIMITED = 1e12
 #: frame of the ground about which the rotors turn
 ROTORS = "rotors"
 
@@ -36,6 +38,8 @@ def take_loads(at: Assembly) -> None:
             force = -model.body_gravcomp[b] * model.body_mass[b] * model.opt.gravity
             at.draft.add("load", name, {"type": "point-force", "frame": frame, "force": clean(force)})
     for j, one in at.joints.items():
+        if model.jnt_actgravcomp[j] and model.ngravcomp and model.jnt_actfrclimited[j]:
+            at.draft.changed.append(f"gravity compensation of joint {one.joint} is not limited with its actuators")
         stiffness = 0.0 if off & DISABLED.mjDSBL_SPRING else model.jnt_stiffness[j]
         damping = 0.0 if off & DISABLED.mjDSBL_DAMPER else model.dof_damping[one.speed]
         loss = 0.0 if off & DISABLED.mjDSBL_FRICTIONLOSS else model.dof_frictionloss[one.speed]
@@ -107,13 +111,16 @@ def _add_rotor(at: Assembly, one: Coordinate, armature: float) -> None:
 
 def _take_lines(at: Assembly) -> None:
     """Add tendons between two sites as springs and dampers; list the others."""
-    model, other = at.model, []
+    model, other, off = at.model, [], at.model.opt.disableflags
     for t in range(model.ntendon):
         name, first = at.name(OBJECT.mjOBJ_TENDON, t, "tendon"), model.tendon_adr[t]
         sites = [model.wrap_objid[w] for w in range(first, first + model.tendon_num[t])]
         kinds = {mujoco.mjtWrap(int(model.wrap_type[w])) for w in range(first, first + model.tendon_num[t])}
         low, high = model.tendon_lengthspring[t]
-        stiffness, damping = model.tendon_stiffness[t], model.tendon_damping[t]
+        stiffness = 0.0 if off & DISABLED.mjDSBL_SPRING else model.tendon_stiffness[t]
+        damping = 0.0 if off & DISABLED.mjDSBL_DAMPER else model.tendon_damping[t]
+        if np.any(model.tendon_stiffnesspoly[t]) or np.any(model.tendon_dampingpoly[t]) or model.tendon_springyield[t]:
+            at.draft.lost.append(f"stiffness and damping of tendon {name} beyond the linear term")
         if kinds != {mujoco.mjtWrap.mjWRAP_SITE} or len(sites) != 2 or (stiffness and low != high):
             other.append(name)
             continue
@@ -179,15 +186,21 @@ def take_actuators(at: Assembly, control: np.ndarray, activation: np.ndarray) ->
         one = None if on_site else at.joints.get(model.actuator_trnid[a][0])
         if why is None and one is not None and not one.single:
             why = f"it acts on a {one.type} joint"
+        group = int(model.actuator_group[a])
+        if group >= 0 and int(model.opt.disableactuator) >> group & 1:
+            why = f"the file disables its group {group}"
         if why is not None:
             at.draft.lost.append(f"actuator {name}: {why}")
             continue
         dynamics = DYNAMICS(int(model.actuator_dyntype[a]))
         u = [float(control[model.actuator_ctrladr[a]]), 0.0]
-        if model.actuator_ctrllimited[a]:
+        if model.actuator_ctrllimited[a] and not model.opt.disableflags & DISABLED.mjDSBL_CLAMPCTRL:
             u[0] = float(np.clip(u[0], *model.actuator_ctrlrange[a]))
         if dynamics == DYNAMICS.mjDYN_INTEGRATOR:
             u = [float(activation[model.actuator_actadr[a]]), u[0]]
+            if model.actuator_actlimited[a] and u[1]:
+                low, high = model.actuator_actrange[a]
+                at.draft.lost.append(f"limits of the activation of actuator {name}: {low:.6g} to {high:.6g}")
         elif dynamics != DYNAMICS.mjDYN_NONE:
             constant = model.actuator_dynprm[a][0]
             at.draft.changed.append(f"actuator {name} acts at once, without its filter of {constant:.6g} s")
@@ -207,8 +220,8 @@ def _why_no_counterpart(model: Any, a: int) -> str | None:
     if dynamics not in linear or model.actuator_plugin[a] >= 0 or model.actuator_delay[a]:
         return "its activation has a state of its own"
     if via == TRANSMISSION.mjTRN_SITE:
-        still = gain == GAIN.mjGAIN_FIXED and bias == BIAS.mjBIAS_NONE and dynamics == DYNAMICS.mjDYN_NONE
-        return None if still and model.actuator_trnid[a][1] < 0 else "it measures a site"
+        still = gain == GAIN.mjGAIN_FIXED and bias == BIAS.mjBIAS_NONE and dynamics != DYNAMICS.mjDYN_INTEGRATOR
+        return None if still and model.actuator_trnid[a][1] < 0 else "its force on a site changes with time or motion"
     if via not in (TRANSMISSION.mjTRN_JOINT, TRANSMISSION.mjTRN_JOINTINPARENT):
         return f"it acts through a {via.name.removeprefix('mjTRN_').lower()}"
     if not model.actuator_gear[a][0]:
@@ -249,7 +262,9 @@ def _push_joint(at: Assembly, a: int, name: str, one: Coordinate, u: list[float]
     j = model.actuator_trnid[a][0]
     if model.jnt_actfrclimited[j]:
         low, high = max(low, model.jnt_actfrcrange[j][0]), min(high, model.jnt_actfrcrange[j][1])
-    limits = {"limits": [low, high]} if np.isfinite([low, high]).all() else {}
+    if model.jnt_actfrclimited[j] and np.sum(at.model.actuator_trnid[:, 0] == j) > 1:
+        at.draft.changed.append(f"limits of the sum of all actuators of joint {one.joint} hold for each alone")
+    limits = {"limits": [max(low, -UNLIMITED), min(high, UNLIMITED)]} if np.isfinite([low, high]).any() else {}
     span = ", from {:.6g} to {:.6g}".format(*model.actuator_ctrlrange[a]) if model.actuator_ctrllimited[a] else ""
     comment = f"control of {name}: {u[0]:.6g}{span}"
     constant, along, over = gear * (g[0] * u[0] + b[0]), gear**2 * (g[1] * u[0] + b[1]), gear**2 * (g[2] * u[0] + b[2])
@@ -263,6 +278,8 @@ def _push_joint(at: Assembly, a: int, name: str, one: Coordinate, u: list[float]
         at.draft.add("load", name, {"type": "pid", **keys, **gains, **limits}, says)
     else:
         force = _line([constant, growing] if growing else [np.clip(constant, low, high)])
+        if limits and growing:
+            at.draft.lost.append(f"limits of the force of actuator {name}, which grows with time")
         says = f"{comment}; a force, or torque, of {gear * g[0]:.6g} per unit"
         says += f", within {low:.6g} and {high:.6g}" if limits else ""
         at.draft.add("load", name, {"type": "joint-force", **keys, "force": force}, says)

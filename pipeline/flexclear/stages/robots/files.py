@@ -98,6 +98,8 @@ def _checked_root(path: Path, folder: Path, seen: dict[Path, ElementTree.Element
         raise InputError(str(path), "declares entities or is not text in UTF-8", "write it without <!DOCTYPE ...>")
     try:
         root = ElementTree.fromstring(text)
+        if root.tag != "robot":  # MuJoCo takes the bytes of names as they are
+            text.decode()
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError(str(path), f"is not complete XML: {error}", "export or copy it again") from None
     seen[path.resolve()] = root

@@ -197,7 +197,7 @@ def _inertia(model: Any, b: int) -> dict[str, Any]:
 
 def take_loops(at: Assembly) -> None:
     """Add equality constraints: connections and welds as joints, coupled coordinates as gears, held ones as drives."""
-    model, soft = at.model, 0
+    model, soft, coupled = at.model, 0, list[tuple[Coordinate, Coordinate, float, float]]()
     for e in range(model.neq):
         kind, data = EQUALITY(int(model.eq_type[e])), model.eq_data[e]
         name = mujoco.mj_id2name(model, OBJECT.mjOBJ_EQUALITY, e) or f"loop_{e}"
@@ -209,7 +209,14 @@ def take_loops(at: Assembly) -> None:
             what = "a polynomial of joints" if kind == EQUALITY.mjEQ_JOINT else kind.name.removeprefix("mjEQ_").lower()
             at.draft.lost.append(f"equality constraint {name}: {what}")
         else:
-            soft += _couple(at, e, at.take(name, "gear"))
+            soft += 1
+            coupled += _couple(at, e, at.take(name, "gear"))
+    given = np.array(at.q)
+    for second, first, offset, ratio in coupled * len(coupled):  # in rows of couplings one start follows from another
+        at.q[second.address] = offset + ratio * at.q[first.address]
+        at.v[second.speed] = ratio * at.v[first.speed]
+    if moved := [second.joint for second, *_ in coupled if at.q[second.address] != given[second.address]]:
+        at.draft.changed.append(f"positions at the start follow from coupled joints: {', '.join(moved)}")
     if soft:
         at.draft.changed.append(f"{soft} equality constraints are exact; MuJoCo's are soft (solref, solimp)")
 
@@ -234,20 +241,20 @@ def _close(at: Assembly, e: int, name: str, weld: bool) -> bool:
     return True
 
 
-def _couple(at: Assembly, e: int, name: str) -> bool:
-    """Add a gear, or a drive that holds a coordinate; return True."""
+def _couple(at: Assembly, e: int, name: str) -> Iterator[tuple[Coordinate, Coordinate, float, float]]:
+    """Add a gear and yield its second and first coordinate with offset and ratio, or add a drive that holds one."""
     model, (offset, ratio) = at.model, at.model.eq_data[e][:2]
     second, first = (at.joints.get(k) for k in (model.eq_obj1id[e], model.eq_obj2id[e]))
     assert second is not None
+    offset += model.qpos0[second.address]
     if first is None or ratio == 0.0:
-        at.draft.add(
-            "drive", name, {"joint": second.joint, "law": model.qpos0[second.address] + offset}, "a held coordinate"
-        )
-        return True
+        at.draft.add("drive", name, {"joint": second.joint, "law": offset}, "a held coordinate")
+        at.q[second.address], at.v[second.speed] = offset, 0.0
+        return
     units = {(True, False): "rad/m", (False, True): "m/rad"}.get((second.turns, first.turns))
     part = {"first": first.joint, "second": second.joint, "ratio": f"{ratio:.15g} {units}" if units else ratio}
     at.draft.add("gear", name, part, "coupled coordinates")
-    return True
+    yield second, first, offset - ratio * model.qpos0[first.address], ratio
 
 
 def take_start(at: Assembly) -> dict[str, dict[str, Any]]:

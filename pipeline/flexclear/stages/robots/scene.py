@@ -31,6 +31,9 @@ def scene_of(robot: Robot, source: Path, stem: str) -> tuple[str, dict[str, byte
     if max(model.nbody, model.njnt) > most:
         problem = f"has {model.nbody} bodies and {model.njnt} joints, more than the {most} that a scene may have"
         raise InputError(str(source), problem, "name a smaller model")
+    off = mujoco.mjtDisableBit
+    if model.opt.disableflags & off.mjDSBL_CONSTRAINT:
+        model.opt.disableflags |= off.mjDSBL_EQUALITY | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_LIMIT | off.mjDSBL_CONTACT
     key = model.nkey > 0
     q, v = (model.key_qpos[0], model.key_qvel[0]) if key else (model.qpos0, np.zeros(model.nv))
     at = Assembly(model, draft, np.array(q), np.array(v))
@@ -46,7 +49,7 @@ def scene_of(robot: Robot, source: Path, stem: str) -> tuple[str, dict[str, byte
         raise InputError(str(source), "holds no body that moves", "name the robot's own file")
     top = {"title": _title(model, source), "time": TIME, "output": OUTPUT}
     end = {"start.joint": starts} if starts else {}
-    draft.lost[:] = dict.fromkeys(draft.lost)
+    draft.lost[:], draft.changed[:] = dict.fromkeys(draft.lost), dict.fromkeys(draft.changed)
     return scene_text([*_head(robot, source, stem, draft)], top, draft, end), files, draft.lost
 
 

@@ -162,8 +162,13 @@ static Status begun(Model *m) {
     return OK;
 }
 
-static Status advance(Model *m, double duration) {
+static Status advance(Model *m, double time, double duration) {
     double numbers[1 + 2 * NU];
+    if (!(fabs(time - m->time) <= 1e-6 * fmax(fabs(duration), fabs(m->time)))) {
+        char text[120];
+        snprintf(text, sizeof text, "a step from %.9g s is asked for, but the motion is at %.9g s: restore a state", time, m->time);
+        return failed(m, text);
+    }
     numbers[0] = duration;
     fresh(m, 0, NU, numbers + 1);
     for (int k = 0; k < NU; k++) numbers[1 + NU + k] = m->rates[k], m->rates[k] = NAN;
@@ -276,7 +281,7 @@ API Status fmi2SetRealInputDerivatives(Component c, const Ref *r, size_t n, cons
     return OK;
 }
 API Status fmi2GetRealOutputDerivatives(Component c, const Ref *r, size_t n, const int *order, double *v) { return ERROR; }
-API Status fmi2DoStep(Component c, double time, double duration, Bool final) { return advance(c, duration); }
+API Status fmi2DoStep(Component c, double time, double duration, Bool final) { return advance(c, time, duration); }
 API Status fmi2CancelStep(Component c) { return ERROR; }
 API Status fmi2GetStatus(Component c, int kind, Status *v) { return DISCARD; }
 API Status fmi2GetRealStatus(Component c, int kind, double *v) { if (kind != 2) return DISCARD; *v = ((Model *)c)->time; return OK; }
@@ -322,7 +327,7 @@ API Status fmi3SerializedFMUStateSize(Component c, void *s, size_t *n) { *n = si
 API Status fmi3SerializeFMUState(Component c, void *s, uint8_t *b, size_t n) { memcpy(b, s, n); return OK; }
 API Status fmi3DeserializeFMUState(Component c, const uint8_t *b, size_t n, void **s) { return unpack(c, (const char *)b, n, s); }
 API Status fmi3DoStep(Component c, double time, double duration, Bool final, Bool *event, Bool *ended, Bool *early, double *last) {
-    Status status = advance(c, duration);
+    Status status = advance(c, time, duration);
     *event = *ended = *early = 0, *last = ((Model *)c)->time;
     return status;
 }

@@ -227,7 +227,7 @@ def _array(
     )
     if array.dtype.kind not in kinds or not fits:
         raise ValueError(f"'{name}' is an array of {array.dtype.name}, {array.shape}")
-    return array
+    return array.astype(array.dtype.newbyteorder("="), copy=False)
 
 
 def _matrix(path: Path, where: str) -> sp.coo_array:
@@ -293,6 +293,10 @@ def _table(path: Path, where: str, count: int) -> Table:
         path.open(encoding="utf-8", newline="") as file,
     ):
         rows = list(islice(csv.DictReader(file, skipinitialspace=True), count + 1))
+        if short := next((k for k, row in enumerate(rows, 2) if None in row.values()), None):
+            raise ValueError(f"line {short} has too few fields")
         position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows]).reshape(-1, 3)
+        if not np.isfinite(position).all():
+            raise ValueError(f"line {2 + np.argwhere(~np.isfinite(position))[0][0]} has a position that is not finite")
         component = np.array([_component(row["component"]) for row in rows])
         return Table(np.array([int(row["node"]) for row in rows], dtype=np.int64), component, position)

@@ -37,6 +37,8 @@ SYSTEMS = {
 #: mass per volume of the box around a body [kg/m^3], and rough speed of sound [m/s], between which it is of a material
 DENSITY = (1e-3, 1e6)
 SPEED = (20.0, 3e5)
+#: below this mass no body has this speed of sound: bodies in mm, t and s that are read in inches
+LIGHT, FAST = 1.0, 3e4
 #: asymmetry of a matrix, relative to its largest entry, that counts as rounding in the file
 SYMMETRIC = 1e-9
 WHERE = "mesh recipe [shape]"
@@ -119,7 +121,8 @@ def _require_plausible(
 
 
 def _is_material(density: float, speed: float) -> bool:
-    return DENSITY[0] < density < DENSITY[1] and SPEED[0] < speed < SPEED[1]
+    light_and_stiff = density < LIGHT and speed > FAST
+    return DENSITY[0] < density < DENSITY[1] and SPEED[0] < speed < SPEED[1] and not light_and_stiff
 
 
 def _symmetric(matrix: sp.csr_array, name: str, where: str) -> tuple[sp.coo_array, float]:

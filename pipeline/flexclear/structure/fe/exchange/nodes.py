@@ -47,7 +47,8 @@ def read(path: Path, where: str) -> Nodes:
             )
             nodes.sets |= {name.removeprefix("set "): numbers for name, numbers in arrays.items()}
         else:
-            list(companions(path))  # refuses includes in a circle
+            for file in companions(path):  # refuses includes in a circle
+                require_file(file, where)
             nodes = _of_keywords(path, where) if suffix == ".inp" else _of_cards(path, where)
         if not nodes.position or not np.isfinite(list(nodes.position.values())).all():
             raise ValueError("it has no nodes, or nodes at positions that are not three finite numbers")

@@ -7,6 +7,7 @@ Rows of a matrix are numbered from zero; where a file names node and component i
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -127,6 +128,8 @@ def _columns(path: Path) -> Entries:
     """Read lines of node, component, node, component, entry (Abaqus) or row, column, entry (Abaqus, CalculiX)."""
     with path.open(encoding="utf-8") as file:
         first = next((line for line in file if line.strip() and not line.startswith("*")), "")
+    if not first:
+        raise ValueError("it has no entries")
     held = np.loadtxt(path, comments="*", delimiter="," if "," in first else None, ndmin=2, encoding="utf-8")
     if held.shape[1] not in (3, 5):
         raise ValueError(f"its lines have {held.shape[1]} columns, where 3 or 5 are known")
@@ -246,8 +249,12 @@ def unknowns(path: Path, where: str) -> np.ndarray:
     """Return the keys of the rows of a `.dof` file of CalculiX, lines `node.direction`."""
     require_file(path, where)
     with reading(path, where, f"'{path.name}' is no list of node.direction", AGAIN):
-        pairs = np.array([line.split(".") for line in path.read_text(encoding="ascii").split()], dtype=np.int64)
-        return node_keys(*pairs.reshape(-1, 2).T)
+        lines = path.read_text(encoding="ascii").split()
+        if other := next((k for k, line in enumerate(lines, 1) if not re.fullmatch(r"\d{1,15}\.\d", line)), None):
+            raise ValueError(f"line {other} is none")
+        if wrong := [line for line, times in Counter(lines).most_common(1) if times > 1]:
+            raise ValueError(f"it has {wrong[0]} more than once")
+        return node_keys(*np.array([line.split(".") for line in lines], dtype=np.int64).reshape(-1, 2).T)
 
 
 def read_listing(path: Path, where: str) -> tuple[np.ndarray, float | None]:

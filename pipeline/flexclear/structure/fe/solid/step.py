@@ -1,17 +1,24 @@
 """Solids from STEP files, by Gmsh's geometry kernel OpenCASCADE: their meshes, and what is round in them.
 
 Every number is in SI: Gmsh converts the file's own unit. One thread makes every mesh, so that equal files give equal
-bytes.
+bytes. Gmsh runs in a process of its own: a damaged file may end it.
 """
 
 from __future__ import annotations
 
-import signal
+import json
+import os
+import pickle
+import re
+import subprocess
+import sys
+import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +27,7 @@ import numpy as np
 from flexclear.structure.fe.solid.geometry import Geometry
 from flexclear.structure.fe.solid.recipe import StepFile
 from flexclear.system import machine
-from flexclear.system.errors import InputError
+from flexclear.system.errors import FlexclearError, InputError
 from flexclear.system.external_files import reading, require_file
 
 #: Gmsh's number of each element, and its nodes in the order of VTK
@@ -31,6 +38,16 @@ PER_CELL, PER_CUBE = 2000.0, 8.5
 AROUND = 12.0
 #: two cylinders have one axis when these differ by less, as a fraction of the radius; least fraction of a full turn
 ALIKE, TURN = 1e-4, 0.75
+#: what is no number, or none of a part, but stands where one does, outside of texts; Gmsh 4.15 may ask it for ever
+NO_NUMBER = re.compile(rb"'[^']*'|[(,]\s*([+-]?(?:nan|inf|[\d.]+e\+?\d{3})\w*)\s*(?=[,)])", re.IGNORECASE)
+#: longest time to read a file [s]
+LONGEST = 600.0
+#: what the other process runs
+COMMAND = """import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from flexclear.structure.fe.solid.step import answer
+answer(sys.argv[2])
+"""
 
 
 @dataclass(frozen=True)
@@ -46,13 +63,13 @@ class Round:
     radius: float
     length: float
 
-    def along(self, other: Round) -> bool:
-        """Return True when two cylinders have one axis and overlap along it."""
+    def along(self, other: Round, gap: float = 0.0) -> bool:
+        """Return True when two cylinders have one axis and overlap along it, or almost, by a gap [m]."""
         offset, near = other.centre - self.centre, ALIKE * max(self.radius, other.radius)
         place = float(offset @ self.axis)
         across = float(np.linalg.norm(offset - place * self.axis))
         parallel = float(np.linalg.norm(np.cross(self.axis, other.axis))) < ALIKE
-        return parallel and across < near and abs(place) < 0.5 * (self.length + other.length) - near
+        return parallel and across < near and abs(place) < 0.5 * (self.length + other.length) + gap - near
 
 
 @dataclass(frozen=True)
@@ -66,31 +83,70 @@ class Solid:
     rounds: tuple[Round, ...]
 
 
-def start(gmsh: Any) -> None:
-    """Start Gmsh, which would let a closed pipe end this process from then on; Python makes an error of it."""
-    gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
-    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
+def _apart(longest: float | None, path: Path, where: str, call: Callable[..., Any], *arguments: Any) -> Any:
+    """Return what a function of this module returns in a process of its own; raise InputError where that ends.
+
+    longest: time to wait [s].
+    """
+    require_file(path, where)
+    machine.require_memory(20.0 * path.stat().st_size, f"{where}: '{path.name}'", "export fewer parts")
+    if find_spec("gmsh") is None:
+        raise InputError(where, "STEP files need Gmsh", "pip install 'flexclear[cad]'")
+    text = path.read_bytes()
+    if not text[:200].lstrip().startswith(b"ISO-10303-21"):
+        raise InputError(where, f"'{path.name}' does not begin as a STEP file does", "export it as STEP AP214 or AP242")
+    if wrong := next((found for found in NO_NUMBER.finditer(text) if found[1]), None):
+        line = text.count(b"\n", 0, wrong.start(1)) + 1
+        raise InputError(
+            where, f"line {line} of '{path.name}': {wrong[1].decode()} is no number of a part", "export it again"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        letter = Path(folder) / "call"
+        letter.write_bytes(pickle.dumps((call, arguments)))
+        command = [sys.executable, "-c", COMMAND, json.dumps([str(folder) for folder in sys.path]), str(letter)]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+            try:
+                ended = f"ended with {failed}" if (failed := process.wait(longest)) else ""
+            except subprocess.TimeoutExpired:
+                process.kill()
+                ended = f"is not ready after {longest:g} s"
+        if ended:
+            raise InputError(where, f"Gmsh fails at '{path.name}': it {ended}", "export it as STEP AP214 or AP242")
+        result = pickle.loads(letter.read_bytes())
+    if isinstance(result, FlexclearError):
+        raise result
+    return result
+
+
+def answer(letter: str) -> None:
+    """Call the function that a file names, with its arguments, and write what it returns or refuses to the file."""
+    threading.Thread(target=_follow_parent, daemon=True).start()
+    call, arguments = pickle.loads(Path(letter).read_bytes())
+    try:
+        result = call(*arguments)
+    except FlexclearError as error:
+        result = error
+    Path(letter).write_bytes(pickle.dumps(result))
+
+
+def _follow_parent() -> None:
+    os.read(0, 1)
+    os._exit(1)
 
 
 @contextmanager
 def open_step(path: Path, where: str) -> Iterator[Any]:
     """Yield Gmsh with the solids of a STEP file; raise InputError, in words, without Gmsh or without any solid."""
-    require_file(path, where)
-    machine.require_memory(20.0 * path.stat().st_size, f"{where}: '{path.name}'", "export fewer parts")
     try:
         gmsh = import_module("gmsh")  # its version is in the keys of these meshes only
     except (ImportError, OSError) as error:
-        reason = "" if isinstance(error, ImportError) else f" ({error})"
-        raise InputError(where, f"STEP files need Gmsh{reason}", "pip install 'flexclear[cad]'") from None
-    start(gmsh)
+        raise InputError(where, f"STEP files need Gmsh ({error})", "pip install 'flexclear[cad]'") from None
+    gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     try:
         for option, value in (("General.Terminal", 0), ("General.NumThreads", 1), ("General.AbortOnError", 2)):
             gmsh.option.setNumber(option, value)
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
         with reading(path, where, f"Gmsh cannot read '{path.name}'", "export it as STEP AP214 or AP242"):
-            if not path.read_bytes()[:200].lstrip().startswith(b"ISO-10303-21"):
-                raise ValueError("it does not begin as a STEP file does")
             gmsh.model.occ.importShapes(str(path), format="step")
             gmsh.model.occ.synchronize()
         if not gmsh.model.getEntities(3):
@@ -102,7 +158,12 @@ def open_step(path: Path, where: str) -> Iterator[Any]:
 
 def mesh_step_file(shape: StepFile, folder: Path, where: str) -> Geometry:
     """Mesh a solid of a STEP file; raise InputError for a file without it, ResourceError for too fine a mesh."""
-    path = folder / shape.file
+    found: Geometry = _apart(None, folder / shape.file, where, _mesh, shape, folder / shape.file, where)
+    return found
+
+
+def _mesh(shape: StepFile, path: Path, where: str) -> Geometry:
+    """Mesh a solid of a STEP file in this process."""
     with open_step(path, where) as gmsh:
         tags = [tag for _, tag in gmsh.model.getEntities(3)]
         if not 1 <= shape.solid <= len(tags):
@@ -128,7 +189,13 @@ def mesh_step_file(shape: StepFile, folder: Path, where: str) -> Geometry:
 
 
 def solids(path: Path, where: str) -> list[Solid]:
-    """Return the solids of a STEP file in its order, as `open_step` reads them."""
+    """Return the solids of a STEP file in its order; raise InputError for a file without any."""
+    found: list[Solid] = _apart(LONGEST, path, where, _solids, path, where)
+    return found
+
+
+def _solids(path: Path, where: str) -> list[Solid]:
+    """Return the solids of a STEP file in its order, as `open_step` reads them in this process."""
     with open_step(path, where) as gmsh:
         found = []
         for dim, tag in gmsh.model.getEntities(3):
@@ -159,12 +226,15 @@ def _piece(gmsh: Any, solid: int, face: int) -> tuple[Round, float]:
     length, radius = float(np.linalg.norm(end - first)), float(np.linalg.norm(first - middle))
     axis = (end - first) / length
     inner, inside = middle + 0.5 * (end - first), 0
-    for k in range(8):  # outside of a shaft is material only where something is attached
+    for k in range(
+        8
+    ):  # outside of a shaft is material where something is attached, none of a hole where another crosses
         u = low[0] + (k + 0.5) / 8.0 * (high[0] - low[0])
         surface = at(u, 0.5 * (low[1] + high[1]))
-        inside += int(gmsh.model.isInside(3, solid, (surface + 1e-3 * (surface - inner)).tolist()))
+        for side in (1.0, -1.0):
+            inside += int(side) * gmsh.model.isInside(3, solid, (surface + side * 1e-3 * (surface - inner)).tolist())
     axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
-    return Round(inside > 4, inner, axis, radius, length), float(gmsh.model.occ.getMass(2, face))
+    return Round(inside > 0, inner, axis, radius, length), float(gmsh.model.occ.getMass(2, face))
 
 
 def _merge_cylinders(pieces: list[tuple[Round, float]]) -> Iterator[Round]:
