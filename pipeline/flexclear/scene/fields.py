@@ -163,11 +163,12 @@ def _texts(part: type) -> list[tuple[str, str]]:
         lines = ast.parse(textwrap.dedent(inspect.getsource(part))).body[0].body  # type: ignore[attr-defined]
     except OSError:  # a class made by a function
         return []
-    return [
-        (key.target.id, inspect.cleandoc(text.value.value))
-        for key, text in pairwise(lines)
-        if isinstance(key, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
-    ]
+    found = list[tuple[str, str]]()
+    for pair in pairwise(lines):
+        match pair:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                found.append((name, inspect.cleandoc(text)))
+    return found
 
 
 class Part(BaseModel):
