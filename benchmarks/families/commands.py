@@ -50,10 +50,12 @@ class Command:
 
 
 _CSJ, _IDEAL = "scenes/sps4/csj.toml", "scenes/sps4/ideal.toml"
-_CLEARANCE, _MASS = ("joint.A1.clearance", 0.0005), ("body.platform.mass", 0.31)
+_CLEARANCE, _MASS, _PIN = ("joint.A1.clearance", 0.0005), ("body.platform.mass", 0.31), ("joint.pin.clearance", 0.00014)
+_NEW = "pipeline/flexclear/stages/templates/slider_crank/slider_crank.toml"
 COMMANDS: Mapping[str, Command] = {
     "run csj, a changed number": Command(("run", "-q", _CSJ, "--set", f"{_CLEARANCE[0]}={{}}"), _CLEARANCE[1]),
     "run ideal, a changed number": Command(("run", "-q", _IDEAL, "--set", f"{_MASS[0]}={{}}"), _MASS[1]),
+    "run slider-crank of `new`, a changed number": Command(("run", "-q", _NEW, "--set", f"{_PIN[0]}={{}}"), _PIN[1]),
     "run csj, nothing changed": Command(("run", "-q", _CSJ)),
     "check csj": Command(("check", _CSJ)),
     "report of the paper, nothing changed": Command(("-q",), own=True, program="papers.wang_wang_2019"),

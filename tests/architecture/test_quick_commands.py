@@ -87,13 +87,21 @@ def test_what_is_fresh_needs_no_library_that_computes_or_draws(
     assert found <= ALLOWED
 
 
-@pytest.mark.parametrize("scene", ["checks/pendulum", "checks/clamped_rod"])
+@pytest.mark.parametrize(
+    "scene, more",
+    [
+        ("checks/pendulum", ()),
+        ("checks/pendulum", ("--set", "accuracy={'bob.position'='1 mm'}")),
+        ("checks/clamped_rod", ()),
+    ],
+    ids=["rigid", "compared with others", "flexible"],
+)
 def test_a_run_imports_neither_xarray_nor_what_scipy_computes(
-    scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    scene: str, more: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of rigid bodies and of flexible ones whose bundles are fresh: xarray takes as long as all else of a short run."""
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    short = (scene, "--set", "time.end='1 us'", "--jobs", "1")
+    short = (scene, "--set", "time.end='1 us'", *more, "--jobs", "1")
     if scene == "checks/clamped_rod":
         assert "xarray" in imported("run", *short, "--to", "bundle", results=tmp_path)
     found = imported("run", *short, results=tmp_path)

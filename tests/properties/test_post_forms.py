@@ -357,3 +357,15 @@ def test_a_rectangular_rod_is_drawn_with_its_sides(root: Path):
     assert corners.sum() == 5 * (2 * PER_CELL + 1)  # the first one is there twice
     round_one = plain | {"section": {"type": "tube", "radius": 0.01, "inner_radius": 0.008}}
     assert rigid_drawing(kind.build(round_one, root))["radius"].values == pytest.approx(0.01, rel=1e-12)
+
+
+def test_an_outline_around_points_is_the_sum_of_their_hull_and_a_disc():
+    """Its area, by mixed areas: a rectangle a x b and a polygon C of 32 corners, as wide as 2 m along both axes, give
+    a b + 2 (a + b) m + |C|; points inside and on the edges change nothing."""
+    a, b, m = 2.0, 1.0, 0.3
+    points = np.array([[0, 0], [a, 0], [a, b], [0, b], [0.5 * a, 0], [0.7, 0.4], [a, 0.2]])
+    x, y = surfaces.hull(points, m).T
+    area = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))  # positive: anticlockwise
+    disc = 0.5 * surfaces.ROUND * m**2 * np.sin(2.0 * np.pi / surfaces.ROUND)
+    assert area == pytest.approx(a * b + 2.0 * (a + b) * m + disc, rel=1e-12)
+    assert len(x) == surfaces.ROUND + 4  # each corner of the rectangle once more: no point on a straight edge

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import flexclear as fc
 from flexclear.post.overview import sweep_figures
@@ -70,6 +71,16 @@ def test_a_zero_line_has_no_range_of_its_own():
         assert list(zero.get_yticks()) == [0.0]
         assert max(small.get_ylim()) == pytest.approx(1e-9, rel=0.2)
         style.files("x", figure)
+
+
+def test_both_files_of_a_figure_have_the_layout_that_was_solved_once(monkeypatch):
+    """To solve it takes as long as to draw both."""
+    solved, solve = [], ConstrainedLayoutEngine.execute
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda self, fig: solved.append(solve(self, fig)))
+    with style.style():
+        figure, _ = style.grid(1, 2, (4.0, 2.0))
+        assert set(style.files("x", figure)) == {"x.png", "x.svg"}
+    assert len(solved) == 1
 
 
 @pytest.mark.parametrize(

@@ -241,6 +241,26 @@ def test_without_gl_there_is_no_film_but_an_error_that_says_why(monkeypatch):
 
 
 @needs_gl
+@pytest.mark.parametrize("direction", [None, (0.3, -1.0, 0.2)], ids=["with floor", "without"])
+def test_a_film_draws_only_the_rows_that_change_as_a_whole_picture_has_them(direction: tuple[float, ...] | None):
+    """From one point on, so that the strip grows; rounding of colours is one or two of 255, edges may be elsewhere."""
+    from flexclear.post.render import film
+
+    run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
+    drawn = mechanism(run, {"rod1": synthetic.bundle()}, Looks(direction=direction))
+    scene = film.plotter((film.VIEW, film.HEIGHT))
+    strip = film.Strip(scene, film.image(scene), drawn.cloud[:1])
+    actors = film._build(scene, drawn)
+    film.place_camera(scene, drawn)
+    for step in (0, run.sizes["time"] // 2):
+        film._place(drawn, actors, step, impact=False)
+        whole = film.still(drawn, step, (film.VIEW, film.HEIGHT)).astype(int)
+        assert (np.abs(strip.image() - whole).max(axis=2) > 3).mean() < 1e-3
+        assert (np.abs(whole - strip.empty).max(axis=2) > 20).mean() > 0.01  # the mechanism is in the picture
+    scene.close()
+
+
+@needs_gl
 def test_a_film_moves():
     """A second picture of one scene shows what has moved since the first: the rod, and everything else."""
     from flexclear.post.render import film

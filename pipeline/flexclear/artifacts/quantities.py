@@ -20,7 +20,7 @@ from flexclear.system.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.artifacts.labelled import LabelledArrays
+    from flexclear.artifacts.labelled import Labelled
     from flexclear.scene.output import Output
     from flexclear.scene.schema import TimeSpan
 
@@ -76,7 +76,7 @@ def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int
     return next(iter(starts[2 * left[starts] > len(time) - starts].tolist()), None)
 
 
-def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
+def series(run: Labelled, quantity: Quantity) -> np.ndarray:
     """Return values over time [SI], shape (time, components), of a quantity that has a value at every time."""
     return (
         evaluate_postfix(quantity.steps, lambda one: _of_part(run, one)) if quantity.steps else _of_part(run, quantity)
@@ -107,7 +107,7 @@ _OPERATORS: dict[str, Callable[..., np.ndarray]] = {
 }
 
 
-def _of_part(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
+def _of_part(run: Labelled, quantity: Quantity) -> np.ndarray:
     kind = KINDS[quantity.kind]
     if kind.variable not in run:
         raise InputError(f"quantity '{quantity.name}'", f"the run has no variable '{kind.variable}'")
@@ -177,7 +177,7 @@ def unit(run: xr.Dataset, quantity: Quantity) -> str:
     return kind.units[1] if turns else quantity.unit
 
 
-def events(run: xr.Dataset | LabelledArrays, quantity: Quantity, until: float = np.inf) -> np.ndarray:
+def events(run: Labelled, quantity: Quantity, until: float = np.inf) -> np.ndarray:
     """Return impact times [s], or the largest contact force [N], of contacts that begin up to `until` [s], shape (n,).
 
     For `impulse` return the total normal impulse of the run [N s].
@@ -193,7 +193,7 @@ def events(run: xr.Dataset | LabelledArrays, quantity: Quantity, until: float = 
     return times
 
 
-def so_far(run: xr.Dataset | LabelledArrays, quantity: Quantity, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
+def so_far(run: Labelled, quantity: Quantity, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Return the largest force of the contacts that began up to each row's time [N], or the impulse [N s], (row,).
 
     time: of all rows [s].
@@ -214,7 +214,7 @@ def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, second
 
 
-def deviation(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
+def deviation(run: Labelled, reference: Labelled, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
     """Return common times [s] and the distance of two runs at each, shape (n,), of a quantity over time."""
     i, j = common_times(run["time"].values, reference["time"].values)
     a, b = series(run, quantity)[i], series(reference, quantity)[j]
@@ -222,7 +222,7 @@ def deviation(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -> tup
     return run["time"].values[i], distance
 
 
-def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: float = np.inf) -> float:
+def error(run: Labelled, reference: Labelled, quantity: Quantity, until: float = np.inf) -> float:
     """Return the largest distance between two runs up to a time [s], in the quantity's unit.
 
     The error is infinite when the runs differ in the number of impacts before `until`.
@@ -238,7 +238,7 @@ def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: flo
     return float(np.abs(a - b).max(initial=0.0)) if len(a) == len(b) else np.inf
 
 
-def scale(run: xr.Dataset, quantity: Quantity) -> float:
+def scale(run: Labelled, quantity: Quantity) -> float:
     """Return the reference of relative errors: the largest change from the start; for forces the largest value.
 
     For impact times it is the time from the start to the last impact.
@@ -255,7 +255,7 @@ def scale(run: xr.Dataset, quantity: Quantity) -> float:
     return float(np.linalg.norm(values - start, axis=1).max())
 
 
-def natural_size(run: xr.Dataset, unit: str) -> float:
+def natural_size(run: Labelled, unit: str) -> float:
     """Return the size that a mechanism's motion gives a length, speed, force or torque [SI]; 0 for other units.
 
     Length: the extent of all frames and centres of mass. Speed: the largest of a centre of mass, or of a point at that

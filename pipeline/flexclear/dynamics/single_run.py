@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from flexclear.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.artifacts.schema import mark_incomplete
-from flexclear.dynamics.events import phases
 from flexclear.dynamics.record.dataset import recorded, warnings
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.progress_rate import Judges
@@ -32,6 +31,8 @@ class SingleRun:
         self._progress, self._scene = progress, scene
         self._run: RunInParts | LabelledArrays
         if scene.event:
+            from flexclear.dynamics.events import phases  # here, since it imports SciPy
+
             self._run = phases.simulated(scene, bundles, progress, judges)
         else:
             self._run = RunInParts(scene, bundles, progress, judges, known)

@@ -130,12 +130,14 @@ def centre_line(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[
     scale: factor on the deformation.  Each result has shape (point, 3), body axes; bending is interpolated by cubics
     from the node rotations, twist linearly.
     """
-    x = bundle.node_position.values
-    u = scale * bundle.shape_translation.values @ q
-    rotation = scale * bundle.shape_rotation.values @ q
+    known = bundle.variables
+    x = known["node_position"].values
+    u = scale * known["shape_translation"].values @ q
+    rotation = scale * known["shape_rotation"].values @ q
+    cells = known["cell_node"].values.astype(int)
     s = np.linspace(0.0, 1.0, PER_CELL, endpoint=False)[:, None]
-    parts = [_element(x[[a, b]], u[[a, b]], rotation[[a, b]], s) for a, b in bundle.cell_node.values.astype(int)]
-    last = int(bundle.cell_node.values[-1, 1])
+    parts = [_element(x[[a, b]], u[[a, b]], rotation[[a, b]], s) for a, b in cells]
+    last = cells[-1, 1]
     parts.append((x[[last]], u[[last]], rotation[[last]]))
     points, displacement, turn = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return points, displacement, turn

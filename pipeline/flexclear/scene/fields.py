@@ -1,9 +1,13 @@
 """Field types that scene files and mesh recipes share: quantities, vectors, poses, sources."""
 
+import ast
+import inspect
 import math
 import re
+import textwrap
 from dataclasses import dataclass
-from itertools import chain
+from functools import cache
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import (
@@ -150,21 +154,45 @@ FrameName = Annotated[str, BeforeValidator(_frame), WithJsonSchema({"type": "str
 Source = str | dict[str, str]
 
 
+@cache
+def _texts(part: type) -> list[tuple[str, str]]:
+    """Return the keys that a class of this program declares with a text below, and the texts."""
+    if not part.__module__.startswith("flexclear."):
+        return []
+    try:
+        lines = ast.parse(textwrap.dedent(inspect.getsource(part))).body[0].body  # type: ignore[attr-defined]
+    except OSError:  # a class made by a function
+        return []
+    found = list[tuple[str, str]]()
+    for pair in pairwise(lines):
+        match pair:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                found.append((name, inspect.cleandoc(text)))
+    return found
+
+
 class Part(BaseModel):
     """Base of all models of scene files: frozen, without unknown keys. Texts below keys are their meaning in schemas.
 
     Modules of parts do not postpone the evaluation of annotations: every command would have to compile each as text.
     """
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     #: begin of the paths of its keys, as messages show it
     _owner: ClassVar[str] = "PART."
 
     source: Source | None = None
     """where the values come from; 'assumed: why' for an assumption"""
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the schema with the texts below keys: to read them takes longer than all else of an import."""
+        schema = handler(core)
+        keys = handler.resolve_ref_schema(schema).get("properties", {})
+        for name, text in {name: text for base in reversed(cls.__mro__) for name, text in _texts(base)}.items():
+            keys.get(cls.model_fields[name].alias or name, {})["description"] = text
+        return schema
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Raise AttributeError for keys, as a scene is changed by copies; set private attributes."""

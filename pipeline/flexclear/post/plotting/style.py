@@ -67,14 +67,15 @@ def style() -> Iterator[None]:
 def files(name: str, figure: Figure) -> dict[str, bytes]:
     """Return the figure as ``name.png`` and ``name.svg``, without dates or versions, and close it."""
     result = {}
-    # the layout is solved once and then fixed; else each format would solve it again
-    figure.draw_without_rendering()
+    # the layout is solved once and then fixed; else each format would solve it again, and draw once more for that
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)
     with mpl.rc_context({"figure.constrained_layout.use": False}):
         figure.set_layout_engine(None)
-    for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format=kind, metadata=metadata, facecolor="white")
-        result[f"{name}.{kind}"] = buffer.getvalue()
+        for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format=kind, metadata=metadata, facecolor="white")
+            result[f"{name}.{kind}"] = buffer.getvalue()
     plt.close(figure)
     return result
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from flexclear.post.plotting import style
 from flexclear.post.render import film_speed, layout, mechanism, ruler
 from flexclear.post.render.panel import panel
 from flexclear.post.render.surfaces import Surface
-from flexclear.post.render.view import ANGLE, eye, upright
+from flexclear.post.render.view import ANGLE, View, axes_of, eye, upright
 from flexclear.scene.quantity import Quantity
 from flexclear.system.progress import Progress, silent
 
@@ -26,6 +27,10 @@ VIEW, SIDE, HEIGHT = 656, 304, 540
 INK = (34, 34, 34)
 BACKGROUND, BACKGROUND_TOP = "#ffffff", "#e6ecf2"
 SOFT = "#5b6570"
+#: empty rows of a picture above and below its parts, at least
+ROOM = 6
+#: half the height of what the eye sees, over its distance
+SLOPE = float(np.tan(0.5 * np.radians(ANGLE)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +39,53 @@ class Actors:
 
     parts: tuple[Any, ...]
     flexible: tuple[pv.PolyData, ...]
+
+
+@dataclass
+class Strip:
+    """The rows of a film's picture in which something is drawn, from `top` to before `bottom`: the others never change.
+
+    A picture costs what its pixels cost. scene: the film's.  empty: its picture without actors.  cloud: points that are
+    in the strip from its begin [m], shape (n, 3); it grows where a part leaves it.
+    """
+
+    scene: pv.Plotter
+    empty: np.ndarray
+    cloud: np.ndarray
+    top: int = HEIGHT
+    bottom: int = 0
+
+    def image(self) -> np.ndarray:
+        """Return the current picture at its full height."""
+        corners = list(product(*np.reshape(self.scene.renderer.ComputeVisiblePropBounds(), (3, 2))))
+        top, bottom = self._rows(np.array(corners))
+        if top < self.top or bottom > self.bottom:
+            first, last = self._rows(self.cloud)
+            self._draw_only(min(top, first, self.top), max(bottom, last, self.bottom))
+        picture = self.empty.copy()
+        picture[self.top : self.bottom] = image(self.scene)
+        return picture
+
+    def _rows(self, points: np.ndarray) -> tuple[int, int]:
+        """Return the first row in which points [m] are drawn, and the one after the last: all, unless all points are in
+        front of the eye."""
+        camera = self.scene.camera
+        position, focus, upwards = (np.array(v) for v in (camera.position, camera.focal_point, camera.up))
+        _, up, back = ((points - position) @ axes_of(View(position - focus, upwards, False), position, focus)).T
+        if not (back < 0.0).all():
+            return 0, HEIGHT
+        rows = np.clip(0.5 * HEIGHT * (1.0 + up / (back * SLOPE)), 0.0, HEIGHT)
+        return max(int(rows.min()) - ROOM, 0), min(int(rows.max()) + ROOM, HEIGHT)
+
+    def _draw_only(self, top: int, bottom: int) -> None:
+        """Let the plotter draw these rows only, with their part of the background."""
+        self.top, self.bottom, height = top, bottom, bottom - top
+        self.scene.window_size = [VIEW, height]
+        self.scene.camera.view_angle = np.degrees(2.0 * np.arctan(SLOPE * height / HEIGHT))
+        self.scene.camera.SetWindowCenter(0.0, (HEIGHT - top - bottom) / height)
+        low, high = (np.array(pv.Color(color).float_rgb) for color in (BACKGROUND, BACKGROUND_TOP))
+        ends = [low + (high - low) * (1.0 - row / HEIGHT) for row in (bottom, top)]
+        self.scene.set_background(ends[0], top=ends[1])
 
 
 def still(drawn: mechanism.Mechanism, step: int, size: tuple[int, int] = (1200, 900), margin: int = 0) -> np.ndarray:
@@ -64,6 +116,7 @@ def frames(
     shown = film_speed.frame_times(drawn.run, drawn.looks.duration, drawn.looks.impact_slowdown, rate)
     steps = shown.steps(drawn.run)
     scene = plotter((VIEW, HEIGHT))
+    strip = Strip(scene, image(scene), drawn.cloud)
     actors = _build(scene, drawn)
     margin = 0 if drawn.stress is None else ruler.BAR
     place_camera(scene, drawn, margin)
@@ -79,7 +132,7 @@ def frames(
         for k, step in enumerate(steps):
             impact = _in_contact(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), impact)
-            picture = image(scene)
+            picture = strip.image()
             caption.onto(picture, f"{film_speed.speed_text(float(shown.slower[k]))}{larger}, bar: {in_unit(bar, 'm')}")
             picture[-36:-33, VIEW - 16 - long : VIEW - 16] = INK
             if legend is not None:

@@ -15,10 +15,20 @@ EXTRA = "pictures and films need further libraries: pip install 'flexclear[rende
 #: libraries that draw, and that make films
 LIBRARIES = ("pyvista", "imageio")
 
-_PROBE = (
-    "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(32, 32)); "
-    "p.add_mesh(pyvista.Sphere()); p.screenshot(return_img=True)"
-)
+#: draws a sphere as pyvista does, whose import would take longer than the rest
+_PROBE = """
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkFiltersSources import vtkSphereSource
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow
+sphere, mapper, actor = vtkSphereSource(), vtkPolyDataMapper(), vtkActor()
+renderer, window = vtkRenderer(), vtkRenderWindow()
+mapper.SetInputConnection(sphere.GetOutputPort())
+actor.SetMapper(mapper)
+renderer.AddActor(actor)
+window.SetOffScreenRendering(1)
+window.AddRenderer(renderer)
+window.Render()
+"""
 
 
 def state() -> str:

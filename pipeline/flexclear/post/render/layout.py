@@ -130,9 +130,9 @@ def samples(run: xr.Dataset) -> list[int]:
 
 def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
     """Return the homogeneous matrix of a body, from axes through its centre of mass to the world."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = quaternion_to_matrix(run.quaternion.values[step, index])
-    matrix[:3, 3] = run.position.values[step, index]
+    matrix, known = np.eye(4), run.variables  # of which films read many: arrays with coordinates take longer to make
+    matrix[:3, :3] = quaternion_to_matrix(known["quaternion"].values[step, index])
+    matrix[:3, 3] = known["position"].values[step, index]
     return matrix
 
 
@@ -153,7 +153,7 @@ def _carrier(run: xr.Dataset, owner: int | None, frame: int | None, step: int) -
     """Return the homogeneous matrix from a body's axes, about its centre of mass or one of its frames, to the world."""
     matrix = np.eye(4) if owner is None else pose(run, owner, step)
     if frame is not None:
-        matrix[:3, 3] = run.frame_position.values[step, frame]
+        matrix[:3, 3] = run.variables["frame_position"].values[step, frame]
     return matrix
 
 

@@ -155,11 +155,11 @@ def cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible], 
 
 def drawn_points(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
     """Return world points of the exaggerated surface, shape (point, 3), and their true displacement [m], (point,)."""
-    q = run.modal_coordinate.values[step, body.columns]
+    q, known = run.variables["modal_coordinate"].values[step, body.columns], body.bundle.variables
     points, size = surface(body.bundle, q, body.scale)
     matrix = pose(run, body.index, step)
-    moment = body.bundle.first_moment.values + body.bundle.modal_first_moment.values @ q
-    return (points - moment / float(body.bundle.mass)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
+    moment = known["first_moment"].values + known["modal_first_moment"].values @ q
+    return (points - moment / float(known["mass"].values)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
 
 
 def shaded_points(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 #: corners of round shapes
 ROUND = 32
@@ -73,7 +72,22 @@ def hull(positions: np.ndarray, margin: float) -> np.ndarray:
     turn = np.linspace(0.0, 2.0 * np.pi, ROUND, endpoint=False)
     circle = margin * np.column_stack([np.cos(turn), np.sin(turn)])
     spread = (positions[:, None, :] + circle).reshape(-1, 2)
-    return spread[ConvexHull(spread).vertices]
+    ordered = spread[np.lexsort((spread[:, 1], spread[:, 0]))]
+    return np.array([*_below(ordered), *_below(ordered[::-1])])
+
+
+def _below(points: np.ndarray) -> list[np.ndarray]:
+    """Return the points of a convex chain from the first to the one before the last, the others at its left.
+
+    Andrew's algorithm: scipy, which has another, takes longer to import than a page takes to draw.
+    """
+    chain = list[np.ndarray]()
+    tiny = 1e-12 * float(np.ptp(points, axis=0).max()) ** 2
+    for point in points:
+        while len(chain) > 1 and np.linalg.det([chain[-1] - chain[-2], point - chain[-2]]) <= tiny:
+            chain.pop()
+        chain.append(point)
+    return chain[:-1]
 
 
 def revolve(profile: np.ndarray, corners: int = ROUND) -> Surface:

@@ -20,7 +20,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import xarray as xr
 
 from flexclear.artifacts import quantities
 from flexclear.scene.load import edited
@@ -95,35 +94,35 @@ class Search:
     costs: Costs | None = None
     predictable: bool = False
     begun: dict[float, Parts] = field(default_factory=dict)
-    shown: dict[float, xr.Dataset] = field(default_factory=dict)
-    wholes: dict[float, xr.Dataset] = field(default_factory=dict)
+    shown: dict[float, LabelledArrays] = field(default_factory=dict)
+    wholes: dict[float, LabelledArrays] = field(default_factory=dict)
 
-    def whole(self, rtol: float) -> xr.Dataset:
+    def whole(self, rtol: float) -> LabelledArrays:
         """Return the whole run at a tolerance, made once."""
         if rtol not in self.wholes:
             self.wholes[rtol] = self.shown[rtol] = self._made(rtol, lambda parts: parts.whole())
         return self.wholes[rtol]
 
-    def until(self, rtol: float, time: float) -> xr.Dataset:
+    def until(self, rtol: float, time: float) -> LabelledArrays:
         """Return the run at a tolerance up to a time [s] or later; its parts are made once."""
-        if rtol not in self.shown or float(self.shown[rtol]["time"][-1]) < min(time, self.scene.time.end):
+        if rtol not in self.shown or _end(self.shown[rtol]) < min(time, self.scene.time.end):
             self.shown[rtol] = self._made(rtol, lambda parts: parts.until(time))
         return self.shown[rtol]
 
-    def _made(self, rtol: float, part: Callable[[Parts], LabelledArrays]) -> xr.Dataset:
+    def _made(self, rtol: float, part: Callable[[Parts], LabelledArrays]) -> LabelledArrays:
         change: dict[str, object] = {"solver.rtol": rtol}
         if self.costs is None:
             if rtol not in self.begun:
                 self.begun[rtol] = self.make(edited(self.scene, change), None)
-            return part(self.begun[rtol]).to_xarray()
+            return part(self.begun[rtol])
         name, why, known = self.costs.best(rtol), self.costs.why(rtol), rtol in self.begun
         if not known:
             change["solver.integrator"] = name
             self.begun[rtol] = self.make(edited(self.scene, change), self.costs.judges(rtol))
-        run = part(self.begun[rtol]).to_xarray()
+        run = part(self.begun[rtol])
         if known:
             return run.assign_attrs(method_reason=self.shown[rtol].attrs["method_reason"])
-        share = (float(run["time"][-1]) - self.scene.time.start) / self.costs.span
+        share = (_end(run) - self.scene.time.start) / self.costs.span
         self.costs.learn(rtol, name, run, min(share, 1.0))
         return run.assign_attrs(method_reason=why)
 
@@ -182,10 +181,10 @@ class Search:
         return later
 
     @property
-    def sizes(self) -> xr.Dataset:
+    def sizes(self) -> LabelledArrays:
         """The run by whose sizes relative requests are judged: the tightest one that reached the end."""
-        end = max(float(run["time"][-1]) for run in self.shown.values())
-        return self.shown[min(rtol for rtol, run in self.shown.items() if float(run["time"][-1]) >= end)]
+        end = max(map(_end, self.shown.values()))
+        return self.shown[min(rtol for rtol, run in self.shown.items() if _end(run) >= end)]
 
     def cheapest(self, attempt: Attempt) -> Attempt:
         """Return the attempt, or the run that served its error estimate if another method made that run at less cost:
@@ -194,12 +193,12 @@ class Search:
         if not attempt.met or finer not in self.shown:
             return attempt
         run, other = self.shown[attempt.rtol], self.shown[finer]
-        rates = [one.attrs["evaluations"] / float(one["time"][-1] - one["time"][0]) for one in (run, other)]
+        rates = [one.attrs["evaluations"] / float(np.ptp(one["time"].values)) for one in (run, other)]
         if other.attrs["method"] == run.attrs["method"] or rates[1] >= rates[0]:
             return attempt
         return Attempt(finer, attempt.errors, attempt.fraction)
 
-    def requested(self, run: xr.Dataset) -> dict[Quantity, float]:
+    def requested(self, run: LabelledArrays) -> dict[Quantity, float]:
         """Return the requested accuracy in SI by quantity; relative ones refer to the quantity's size in `run`."""
         accuracy = self.scene.accuracy
         assert accuracy is not None
@@ -223,7 +222,7 @@ class Search:
         return requested
 
 
-def deliver(scene: Scene, make: Make, progress: Progress, costs: Costs | None = None) -> xr.Dataset:
+def deliver(scene: Scene, make: Make, progress: Progress, costs: Costs | None = None) -> LabelledArrays:
     """Return the cheapest run whose estimated errors meet the request, or the most accurate one with an explanation.
 
     costs: costs for method selection; None where the scene names an integrator.  The dataset's attributes state
@@ -232,7 +231,7 @@ def deliver(scene: Scene, make: Make, progress: Progress, costs: Costs | None = 
     return _delivered(Search(scene, make, costs), progress)
 
 
-def at_tolerance(scene: Scene, make: Make, costs: Costs) -> xr.Dataset:
+def at_tolerance(scene: Scene, make: Make, costs: Costs) -> LabelledArrays:
     """Return the run of a scene at its own tolerance, by the method that is predicted to be cheapest."""
     return Search(scene, make, costs).whole(scene.solver.rtol)
 
@@ -242,7 +241,7 @@ def by_default(
     make: Make,
     progress: Progress,
     costs: Callable[[Scene], Costs],
-) -> xr.Dataset:
+) -> LabelledArrays:
     """Return the run of a scene that requests no accuracy and leaves its integration open.
 
     As `deliver`, for BY_DEFAULT of each usual quantity over time (`Scene.requested_quantities`), up to the
@@ -285,7 +284,7 @@ def _climb(search: Search, progress: Progress) -> Attempt:
         rtol = search.next_rung(rtol)
     if nearest:
         return min(nearest, key=lambda one: (one.fraction, one.rtol))
-    whole = [rtol for rtol, run in search.shown.items() if float(run["time"][-1]) >= search.scene.time.end]
+    whole = [rtol for rtol, run in search.shown.items() if _end(run) >= search.scene.time.end]
     if not whole:
         raise refusal
     return Attempt(min(whole), {}, math.inf)
@@ -293,11 +292,16 @@ def _climb(search: Search, progress: Progress) -> Attempt:
 
 def _horizon(search: Search, rtol: float) -> float:
     """Return the time up to which a run counts [s]: its predictability horizon, its end where none is asked for."""
-    run = search.whole(rtol) if search.predictable else {}
-    return float(run["horizon"]) if "horizon" in run else search.scene.time.end
+    run = search.whole(rtol) if search.predictable else None
+    return float(run["horizon"].values) if run is not None and "horizon" in run else search.scene.time.end
 
 
-def _delivered(search: Search, progress: Progress) -> xr.Dataset:
+def _end(run: LabelledArrays) -> float:
+    """Return the last time of a run [s]."""
+    return float(run["time"].values[-1])
+
+
+def _delivered(search: Search, progress: Progress) -> LabelledArrays:
     best = search.cheapest(_climb(search, progress))
     run = search.whole(best.rtol)
     requested = {
@@ -333,7 +337,7 @@ def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> st
     if looser is None:
         return text
     quantity, run = parse(name, search.scene.owners()), search.shown[best.rtol]
-    until = float(run["horizon"]) if search.predictable and "horizon" in run else math.inf
+    until = float(run["horizon"].values) if search.predictable and "horizon" in run else math.inf
     if not best.errors[name] < STUCK * quantities.error(search.shown[looser], run, quantity, until):
         until_then = _trusted_until(search, best, quantity, requested[name])
         return f"{text}; tighter tolerances do not help{until_then}: the motion is chaotic or rounding decides"

@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import xarray as xr
 
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics import memory as m
@@ -236,7 +235,7 @@ class Costs:
 
         return verdict
 
-    def learn(self, rtol: float, name: str, run: xr.Dataset, part: float = 1.0) -> None:
+    def learn(self, rtol: float, name: str, run: Labelled, part: float = 1.0) -> None:
         """Store the cost of a run that began with an integrator. part: fraction of the motion that it covers."""
         if DEFAULT in self.expected:  # where stability limits the steps, the progress rate gives the whole cost
             self.seen.setdefault(DEFAULT, {})[rtol] = self.expected[DEFAULT]
