@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
-from benchmarks.rigid_slider import rigid_heights
+from benchmarks.rigid_impacts import rigid_heights
 from flexclear.dynamics.contact.surfaces.ball_on_strip import separation
 from flexclear.dynamics.linear.clearance_response import bounds
 from flexclear.dynamics.model.mechanism import build

@@ -98,7 +98,7 @@ def test_errors_of_the_steps_fall_with_the_tolerance_and_volumes_stay() -> None:
 
 
 def test_a_pin_that_turns_wears_all_around_in_proportion_to_the_cycles(place: Workplace) -> None:
-    """Depth = k F s/(H A) per cycle, as measured by Dickrell & Sawyer (2004), Tribology Transactions 47, 257-262.
+    """Depth = k F s/(H A) per cycle: Dickrell & Sawyer (2004), Evolution of wear in a two-dimensional bushing.
 
     The force is the weight whatever the clearance; the speed at the surface falls with the radius.
     """
