@@ -209,6 +209,14 @@ def test_stiffer_corners_come_close_to_newtons_law_for_rigid_ones() -> None:
     assert np.array(away[:-1]) / np.array(away[1:]) == pytest.approx(np.full((2, 2), 10.0**0.4), rel=0.05)
 
 
+def test_sharp_corners_take_a_law_of_ones_own() -> None:
+    """Hertz's written as an expression, which is the law of each corner, gives the same motion."""
+    own = {"law": "expression", "force": "K*depth", "values": {"K": f"{STIFFNESS} N/m"}}
+    found, known = (state(simulate(sliding([0.3, 0.0, 1.0], [0.0, 5.0, 0.0], normal=law))) for law in (own, LINEAR))
+    for one, exact in zip(found, known, strict=True):
+        assert one == pytest.approx(exact, abs=1e-9 * max(1.0, float(np.abs(exact).max())))
+
+
 # Faces that end ------------------------------------------------------------------------------------------------------
 GUIDE = 0.15
 
