@@ -103,11 +103,19 @@ def states(engine: Engine, run: Trajectory) -> dict[str, State]:
         forces = observe_run(engine, run).touch["normal_force"]
         found["in contact"] = np.flatnonzero(np.all(forces > 0.0, axis=1))
     # the middle of the candidates: at the start many terms are zero
-    middles = {name: rows[len(rows) // 2] for name, rows in found.items() if len(rows)}
-    return {
-        name: State(float(record.time[k]), record.modes[k], record.latched[k], record.state[k])
-        for name, k in middles.items()
-    }
+    return {name: _state(record, rows[len(rows) // 2]) for name, rows in found.items() if len(rows)}
+
+
+def most_touching(run: Trajectory) -> dict[str, State]:
+    """Return a state in which as many contacts are closed as at any time of a run ("touching"), if any ever is."""
+    record = recording.record(run.rows, run.contacts)
+    closed = record.modes.sum(axis=1)
+    rows = np.flatnonzero(closed == closed.max())
+    return {"touching": _state(record, rows[len(rows) // 2])} if closed.max(initial=0.0) else {}
+
+
+def _state(record: recording.Record, k: int) -> State:
+    return State(float(record.time[k]), record.modes[k], record.latched[k], record.state[k])
 
 
 def set_state(engine: Engine, state: State) -> None:

@@ -1,4 +1,4 @@
-"""Cost of absent effects, and growth of the cost with the numbers of loops, modes, contacts, rods and outputs.
+"""Cost of absent effects and of each pair of surfaces, and growth with numbers of loops, modes and others.
 
 The N-four-bar has N + 1 upright rods on revolute joints, whose tops are joined by N rods. In space, planar loops with
 revolute joints alone are redundant. Here the joining rods have a spherical joint at each end and may spin about their
@@ -14,7 +14,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.family import Case, Family, Measured, Record
-from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
+from benchmarks.loose_pairs import NAMES, loose_pair
+from benchmarks.mechanisms import (
+    Mechanism,
+    evaluation_time,
+    mechanism,
+    most_touching,
+    states,
+    trajectory,
+    without_clearance,
+)
 from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, once, slope
 from flexclear import dynamics
@@ -45,8 +54,9 @@ EVALUATIONS = 4000
 
 
 def cases() -> list[Case]:
-    """Return as cases the absent effects, then numbers of loops, modes, contacts, flexible rods and outputs."""
+    """Return as cases the absent effects, pairs, then numbers of loops, modes, contacts, flexible rods and outputs."""
     grown = [Case(f"{n} {what}", n) for what, (numbers, _) in KINDS.items() for n in numbers]
+    grown += [Case(f"pair: {name}", name) for name in NAMES]
     return [Case(effect) for effect in ABSENT] + grown
 
 
@@ -55,6 +65,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     for case in cases:
         if case.name in ABSENT:
             yield case, [_absent(case.name)]
+    yield from _pairs({case: loose_pair(case.of) for case in cases if case.name.startswith("pair: ")})
     for what, (_, made) in KINDS.items():
         yield from _grown(what, {case: made(case.of) for case in cases if case.name.endswith(what)})
 
@@ -82,7 +93,7 @@ def stripped(full: Mechanism, effect: str) -> Mechanism:
 
 
 def _grown(what: str, grown: Mapping[Case, Mechanism]) -> Measured:
-    """Yield times of evaluations in free flight by kernels and any specialised code; for outputs, of whole runs."""
+    """Yield times of evaluations in free flight by lists of calls and by straight code; for outputs, of whole runs."""
     tasks, more = dict[str, Callable[[], float]](), dict[str, Record]()
     for case, here in grown.items():
         if what == "outputs":
@@ -104,6 +115,25 @@ def _grown(what: str, grown: Mapping[Case, Mechanism]) -> Measured:
         straight = times.get(f"{case.name}, straight")
         record = {what: case.of, **more.get(case.name, {}), **times[case.name].record(unit)}
         yield case, [record | ({"straight": straight.record(unit)} if straight else {})]
+
+
+def _pairs(made: Mapping[Case, Mechanism]) -> Measured:
+    """Yield times of evaluations in free flight and where most contacts touch, by calls and by straight code."""
+    tasks, touching = dict[tuple[Case, str, str], Callable[[], float]](), dict[Case, tuple[int, int]]()
+    for case, here in made.items():
+        for label, engine in (("us", here.general_engine()), ("straight", here.engine())):
+            run = trajectory(engine)
+            found = most_touching(run) | {"free": states(engine, run)["free"]}
+            touching[case] = run.contacts, int(found["touching"].modes.sum()) if "touching" in found else 0
+            for at, state in found.items():
+                tasks[case, label, at] = partial(evaluation_time, engine, state, EVALUATIONS // 4)
+    times = interleaved(tasks, ROUNDS)
+    for case in made:
+        record: Record = dict(zip(("contacts", "touching"), touching[case], strict=True))
+        measured = {
+            f"{label} {at}": times[key].record("us") for key in tasks if key[0] == case for _, label, at in [key]
+        }
+        yield case, [{"pair": case.of} | {"numbers": record} | measured]
 
 
 def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
@@ -247,6 +277,8 @@ def show(records: list[Record]) -> str:
         "same compiled code": lambda r: "yes" if r["same_code"] else "no",
     }
     parts = [table([r for r in records if "same_code" in r], absent)]
+    if pairs := [r for r in records if "pair" in r]:
+        parts.append(table(pairs, PAIRS))
     for what in KINDS:
         if found := [r for r in records if what in r]:
             parts.append(table(found, _columns(found, what)))
@@ -254,6 +286,21 @@ def show(records: list[Record]) -> str:
             exponent = slope([r[what] for r in found], [r["us"] for r in found])
             parts.append(f"Time grows as the number of loops to the power {exponent:.2f}.")
     return "\n\n".join(parts)
+
+
+def _time(key: str) -> Callable[[Record], str]:
+    return lambda r: spread(r[key], "us", 2) if key in r else ""
+
+
+PAIRS: Columns = {
+    "joint of one body": lambda r: r["pair"],
+    "contacts": lambda r: str(r["numbers"]["contacts"]),
+    "routines, free [us]": _time("us free"),
+    "specialised, free [us]": _time("straight free"),
+    "touching": lambda r: str(r["numbers"]["touching"] or ""),
+    "routines, touching [us]": _time("us touching"),
+    "specialised, touching [us]": _time("straight touching"),
+}
 
 
 def _columns(records: list[Record], what: str) -> Columns:
@@ -282,7 +329,7 @@ def _columns(records: list[Record], what: str) -> Columns:
             "integrals of two modes": lambda r: str(r["products"]),
         }
     return columns | {
-        "kernels [us]": lambda r: spread(r, "us", 2),
+        "routines [us]": lambda r: spread(r, "us", 2),
         "exponent": exponent(lambda r: r["us"]),
         "specialised [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
         "exponent ": exponent(lambda r: r.get("straight", {}).get("us")),
@@ -290,11 +337,12 @@ def _columns(records: list[Record], what: str) -> Columns:
 
 
 FAMILY = Family(
-    what="what absent effects cost, and growth with the numbers of loops, modes, contacts, rods and outputs",
-    takes="6 min",
+    what="what absent effects and pairs cost, and growth with the numbers of loops, modes, contacts, rods and outputs",
+    takes="7 min",
     page="benchmarks.md",
     cases=cases,
     measure=measure,
     show=show,
+    rows=r"none|pin held|the same|in a plane|bounded|flat|backlash",
     quick="5 loops",
 )

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
-from benchmarks.rigid_slider import rigid_heights
+from benchmarks.rigid_impacts import rigid_heights
 from flexclear.dynamics.contact.surfaces.ball_on_strip import separation
 from flexclear.dynamics.linear.clearance_response import bounds
 from flexclear.dynamics.model.mechanism import build
@@ -207,6 +207,14 @@ def test_stiffer_corners_come_close_to_newtons_law_for_rigid_ones() -> None:
         )
     assert np.abs(away[-1]).max() < 2e-6
     assert np.array(away[:-1]) / np.array(away[1:]) == pytest.approx(np.full((2, 2), 10.0**0.4), rel=0.05)
+
+
+def test_sharp_corners_take_a_law_of_ones_own() -> None:
+    """Hertz's written as an expression, which is the law of each corner, gives the same motion."""
+    own = {"law": "expression", "force": "K*depth", "values": {"K": f"{STIFFNESS} N/m"}}
+    found, known = (state(simulate(sliding([0.3, 0.0, 1.0], [0.0, 5.0, 0.0], normal=law))) for law in (own, LINEAR))
+    for one, exact in zip(found, known, strict=True):
+        assert one == pytest.approx(exact, abs=1e-9 * max(1.0, float(np.abs(exact).max())))
 
 
 # Faces that end ------------------------------------------------------------------------------------------------------

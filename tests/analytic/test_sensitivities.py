@@ -14,9 +14,12 @@ from flexclear.dynamics.sensitivity.parameters import Parameter
 from flexclear.scene.load import edited, load_scene, number_at
 from flexclear.scene.quantity import parse_recorded
 from flexclear.scene.schema import Scene
-from flexclear.system.errors import InputError
+from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.analytic.test_contact_pairs import GUIDE, SIDE, WIDTH, sliding
+from tests.analytic.test_films import BALL, GAP, oiled
+from tests.analytic.test_tilting_pins import FLAT, pinned
 from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint, rigid
 from tests.properties.mechanisms import scene as small
 
@@ -248,6 +251,73 @@ def test_a_place_of_a_pin_whose_surfaces_would_overlap_at_the_start() -> None:
     scene = load("clearance_slider_crank", **{"time.end": 5e-4})
     of = ["piston.position.x.final", "piston.velocity.x.final", "pin.impulse"]
     agree(scene, of, {f"body.rod.frames.big_end.position.{k}": h for k, h in ((0, 1e-6), (1, 5e-8))}, 1e-5)
+
+
+SOFT = {"law": "flores", "restitution": 0.5, "stiffness": 1e6}
+ROUGH = {"law": "modified-coulomb", "static": 0.1, "dynamic": 0.08, "v_static": 1e-3, "v_dynamic": 1e-2}
+MOVING = ["body.position.final", "body.angular_velocity.final"]
+SPACE = {"width": WIDTH, "side_clearance": SIDE}
+ROUND: dict[str, Any] = {"faces": "bounded", "guide_length": GUIDE, "corner_radius": 2e-3}
+ROUND |= {"normal": SOFT | {"stiffness": 1e8}}
+WALL = {"normal": {"law": "hertz", "stiffness": 1e14}}
+IN_FILM = ["pin.position.final", "A.film_force.final"]
+#: a table of a scene, what is differentiated, relative steps of the differences by parameter
+PAIRS: dict[str, tuple[Any, list[str], dict[str, float]]] = {
+    "flat collars": (
+        pinned([0.05, 0.0, -0.2], [1.0, 0.7, 30.0], **FLAT | {"collar_points": 4}, friction=ROUGH),
+        MOVING,
+        {"joint.pin.collar_radius": 1e-5, "joint.pin.axial_clearance": 1e-5, "body.body.mass": 1e-5},
+    ),
+    "bounded faces that are left": (
+        sliding([0.3, 0.0, 2.0], [0.0, 5.0, 0.0], 0.03, **ROUND, friction=ROUGH),
+        MOVING,
+        {"joint.guide.guide_length": 1e-5, "joint.guide.height": 1e-5, "body.body.velocity.2": 1e-5},
+    ),
+    "bounded faces in space": (
+        sliding([0.3, 0.2, 2.0], [2.0, 5.0, 4.0], 0.03, **ROUND, **SPACE),
+        MOVING,
+        {"joint.guide.guide_length": 1e-5, "joint.guide.width": 1e-5, "joint.guide.side_clearance": 1e-5},
+    ),
+    "a finite film": (
+        oiled([1e-5, 2e-5, 0.0], [0.1, -0.2, 0.0], 0.004, pin={"angular_velocity": [0.0, 0.0, 200.0]}),
+        IN_FILM,
+        {"joint.A.film.viscosity": 1e-4, "joint.A.clearance": 1e-4, "joint.A.length": 1e-4},
+    ),
+    "a finite film and its wall": (
+        oiled(velocity=[0.0, 3.0, 0.0], end=4e-5, viscosity=1e-3, roughness=0.05 * GAP, joint=WALL),
+        [*IN_FILM[:1], "A.peak_force"],
+        {"joint.A.film.viscosity": 1e-4, "joint.A.film.roughness": 1e-4, "joint.A.clearance": 1e-5},
+    ),
+    "a ball in oil and its wall": (
+        oiled(velocity=[0.0, 3.0, 0.0], end=4e-5, viscosity=1e-3, roughness=0.05 * GAP, joint=BALL | WALL),
+        [*IN_FILM[:1], "A.peak_force"],
+        {"joint.A.film.viscosity": 1e-4, "joint.A.film.roughness": 1e-4, "joint.A.clearance": 1e-5},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", PAIRS)
+def test_joints_of_several_contacts_and_films(case: str) -> None:
+    """Tolerance: of differences through several impacts."""
+    table, of, to = PAIRS[case]
+    agree(edited(Scene.model_validate(table), TIGHT), of, to, 3e-6)
+
+
+def test_a_flexible_body_under_a_film() -> None:
+    """Tolerance: of differences of a film whose damping is 4e5 N s/m, in runs that are good to 1e-11."""
+    film = {"viscosity": 0.04, "roughness": 1e-7}
+    scene = load("clearance_cantilever", **{"time.end": 1.5e-3, "joint.tip.film": film, "joint.tip.friction": None})
+    of = ["pin.position.final", "rod.at_120mm.frame_position.final"]
+    agree(scene, of, {"joint.tip.film.viscosity": 1e-3, "joint.tip.clearance": 1e-3}, 1e-6)
+
+
+@pytest.mark.parametrize("more", [{}, SPACE])
+def test_a_sharp_corner_that_is_pressed_past_the_end_of_its_face_has_no_derivative(more: Any) -> None:
+    """The force turns by a right angle there, which changes of the time of passing would multiply."""
+    table = sliding([0.3, 0.0, 2.0], [0.0, 5.0, 0.0], 0.02, faces="bounded", guide_length=GUIDE, normal=SOFT, **more)
+    scene = edited(Scene.model_validate(table), TIGHT)
+    with pytest.raises(SolverError, match=r"'guide\.corner_\d': its corner is pressed past the end .* a corner_radius"):
+        sensitivities(scene, {}, silent, ["body.position.final"], ["joint.guide.guide_length"])
 
 
 def test_the_modulus_of_a_recipe_through_bundles(tmp_path: Path) -> None:

@@ -86,6 +86,31 @@ def test_a_pin_that_stays_at_one_side_wears_a_groove_of_its_own_shape(sectors: i
     assert deepening[-1] < 0.5 * deepening[0]
 
 
+class Easing(Study):
+    """Everywhere the depth h grows by r (1 - h/H) per cycle, so that h = H (1 - exp(-r N/H))."""
+
+    rate, deepest = 1e-9, 2.0 * CLEARANCE
+
+    def _evaluated(self, cycles: float, depths: dict[str, np.ndarray]) -> Wearing:
+        rates = {name: self.rate * (1.0 - depth / self.deepest) for name, depth in depths.items()}
+        return Wearing(cycles, depths, 0.0, None, rates)  # type: ignore[arg-type]
+
+
+def test_steps_are_those_of_adams_and_bashforth_with_the_trapezoidal_rule_as_their_error() -> None:
+    study = Easing(scene(outer_share=0.5), None, tolerance=1e-4)  # type: ignore[arg-type]
+    study.go_on(1e5)
+    at = np.array([one.cycles for one in study.steps])
+    h, r = (np.array([kind(one)[0, 0, 0] for one in study.steps]) for kind in
+            (lambda one: one.depths["hole"], lambda one: one.rates["hole"]))  # fmt: skip
+    step, before = at[2:] - at[1:-1], at[1:-1] - at[:-2]
+    assert h[2:] == pytest.approx(h[1:-1] + step * (r[1:-1] - 0.5 * step / before * (r[:-2] - r[1:-1])), rel=1e-9)
+    errors = np.abs(0.5 * np.diff(at) * (r[1:] + r[:-1]) - np.diff(h)) / CLEARANCE
+    assert [one.error for one in study.steps[1:]] == pytest.approx(errors, rel=1e-6, abs=1e-12)
+    exact = Easing.deepest * (1.0 - np.exp(-Easing.rate * at / Easing.deepest))
+    # no step errs by more than its tolerance
+    assert np.abs(h - exact).max() < 1e-4 * CLEARANCE * len(at)
+
+
 def test_errors_of_the_steps_fall_with_the_tolerance_and_volumes_stay() -> None:
     found = []
     for tolerance in (0.04, 0.01):
@@ -98,7 +123,7 @@ def test_errors_of_the_steps_fall_with_the_tolerance_and_volumes_stay() -> None:
 
 
 def test_a_pin_that_turns_wears_all_around_in_proportion_to_the_cycles(place: Workplace) -> None:
-    """Depth = k F s/(H A) per cycle, as measured by Dickrell & Sawyer (2004), Tribology Transactions 47, 257-262.
+    """Depth = k F s/(H A) per cycle: Dickrell & Sawyer (2004), Evolution of wear in a two-dimensional bushing.
 
     The force is the weight whatever the clearance; the speed at the surface falls with the radius.
     """

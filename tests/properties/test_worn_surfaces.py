@@ -96,3 +96,13 @@ def test_work_in_one_direction_is_spread_over_the_arc_of_overlap() -> None:
     assert spread.sum() == pytest.approx(2.0, rel=1e-14)
     # both fine directions are within 1/8 degree of the middle: 1/268 of the half arc of 33.6 degrees
     assert spread == pytest.approx(2.0 * overlap / overlap.sum(), abs=2.0 / 268.0 * spread.max())
+
+
+@pytest.mark.parametrize("bands", [1, 18])
+def test_depths_are_those_of_the_middles_of_the_sectors_and_the_contact_lies_on_the_worn_surface(bands: int) -> None:
+    depths, places = shapes(bands), directions(bands, 36)
+    for k in range(3, len(places), 40):
+        outer, inner = (one.ravel()[k] for one in depths)
+        found = separated(depths, 1.1 * CLEARANCE * places[k], np.zeros(3))
+        assert found.separation.gap == pytest.approx(outer + inner - 0.1 * CLEARANCE, abs=1e-15)
+        assert list(found.arm) == pytest.approx((RADIUS - inner) * places[k], abs=1e-14)

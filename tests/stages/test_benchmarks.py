@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -234,26 +235,42 @@ def test_the_logged_runs_of_the_peer_are_points_of_cost_studies():
         assert 1e-4 < track["error"]["platform.velocity"][0] < 1e-1
 
 
-def test_the_corners_that_siconos_sees_are_those_of_the_slider(tmp_path: Path) -> None:
-    """Gaps at a tilted pose by hand, and their slopes by differences of 1e-6 rad."""
-    library = tmp_path / "functions.so"
-    subprocess.run(
-        ["cc", "-O2", "-shared", "-fPIC", "-o", library, siconos.SCRIPT.with_suffix(".c"), "-lm"], check=True
-    )
+def compiled_functions(source: str, library: Path) -> Callable[..., np.ndarray]:
+    """Return a function that calls the functions of Siconos in a C source by name."""
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", library, source, "-lm"], check=True)
     functions, numbers = ctypes.CDLL(str(library)), ctypes.POINTER(ctypes.c_double)
 
-    def called(name: str, q: np.ndarray, length: int) -> np.ndarray:
+    def called(name: str, q: np.ndarray, length: int, rows: int = 2) -> np.ndarray:
         result = np.zeros(length)
-        given = [np.ascontiguousarray(q).ctypes.data_as(numbers), ctypes.c_uint(2), result.ctypes.data_as(numbers)]
-        getattr(functions, name)(ctypes.c_uint(3), *given, ctypes.c_uint(0), None)
+        given = [np.ascontiguousarray(q).ctypes.data_as(numbers), ctypes.c_uint(rows), result.ctypes.data_as(numbers)]
+        getattr(functions, name)(ctypes.c_uint(len(q)), *given, ctypes.c_uint(0), None)
         return result
 
+    return called
+
+
+def test_the_corners_that_siconos_sees_are_those_of_the_slider(tmp_path: Path) -> None:
+    """Gaps at a tilted pose by hand, and their slopes by differences of 1e-6 rad."""
+    called = compiled_functions(siconos.slider(0.0).source(), tmp_path / "functions.so")
     q, step = np.array([0.4, -0.19, 0.02]), 1e-6 * np.eye(3)
     for k, (x, side) in enumerate([(1, 1), (-1, 1), (1, -1), (-1, -1)]):
         up = 0.153 * np.sin(0.4) + 0.306 * np.sin(-0.19) + x * 0.05 * np.sin(0.02) + side * 0.025 * np.cos(0.02)
         assert called(f"gap{k}", q, 2)[0] == pytest.approx(0.026 - side * up, rel=1e-13)
         differences = [(called(f"gap{k}", q + d, 2) - called(f"gap{k}", q - d, 2)) / 2e-6 for d in step]
         assert called(f"slope{k}", q, 6).reshape(3, 2) == pytest.approx(np.array(differences), abs=1e-8)
+
+
+def test_the_pins_that_siconos_sees_are_those_of_the_four_bar(tmp_path: Path) -> None:
+    """Places of pins by complex numbers, and their slopes by differences of 1e-6."""
+    called = compiled_functions(siconos.four_bar().source(), tmp_path / "functions.so")
+    q, step = np.array([0.1, 0.21, 0.1, 0.7, 0.31, 0.1, 1.4]), 1e-6 * np.eye(7)
+    crank, coupler, rocker = (np.exp(1j * q[k]) for k in (0, 3, 6))
+    middle, other = complex(q[1], q[2]), complex(q[4], q[5])
+    ways = 0.1 * crank - (middle - 0.15 * coupler), middle + 0.15 * coupler - (other + 0.1 * rocker)
+    for k, way in enumerate([*ways, 0.3 - (other - 0.1 * rocker)]):
+        assert called(f"gap{k}", q, 1, 1)[0] == pytest.approx(2e-4 - abs(way), rel=1e-12)
+        differences = [(called(f"gap{k}", q + d, 1, 1) - called(f"gap{k}", q - d, 1, 1))[0] / 2e-6 for d in step]
+        assert called(f"slope{k}", q, 7, 1) == pytest.approx(np.array(differences), abs=1e-7)
 
 
 def test_without_siconos_there_are_no_records(monkeypatch: pytest.MonkeyPatch) -> None:

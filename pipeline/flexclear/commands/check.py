@@ -297,24 +297,25 @@ def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[In
 
 
 def _check_reference(name: str, part: FlexibleBody) -> None:
-    with _errors_in_body(name):
+    with _errors_in_body(name, part):
         modal_analysis.check(modal_analysis.params(part))
 
 
 def _check_modes(body: Body, name: str, part: FlexibleBody) -> None:
     from flexclear.structure.modes.solution import require_possible
 
-    with _errors_in_body(name):
+    with _errors_in_body(name, part):
         require_possible(body.model, part.modes, body.interfaces)
 
 
 @contextmanager
-def _errors_in_body(name: str) -> Iterator[None]:
-    """Add a body to the place of an error, which is a key of the body."""
+def _errors_in_body(name: str, part: FlexibleBody) -> Iterator[None]:
+    """Add a body, or the rod of which it is a segment, to the place of an error, which is a key of the body."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"[body.{name}.{error.place}]", error.problem, error.remedy) from None
+        written = name.rpartition("_")[0] if part.segment else name
+        raise InputError(f"[body.{written}.{error.place}]", error.problem, error.remedy) from None
 
 
 def _check_assembly(whole: Scene, bodies: Mapping[str, Body], findings: Findings) -> None:
@@ -372,7 +373,7 @@ def _reduce_bodies(whole: Scene, bodies: Mapping[str, Body]) -> dict[str, xr.Dat
     for name, part in whole.flexible().items():
         mesh, requested = bodies[name].mesh, reduction.params(whole, name)
         if bodies[name].model.size <= MOST_REDUCED:
-            with _errors_in_body(name), _as_mistakes():
+            with _errors_in_body(name, part), _as_mistakes():
                 modes = modal_analysis.run(modal_analysis.params(part), {"mesh": mesh}, silent)["nc"]
             reduced[name] = reduction.run(requested, {"mesh": mesh, "modes": modes}, silent)["nc"]
         elif found := _stored(Graph(whole).bundle[name]):

@@ -55,6 +55,11 @@ class _Contact(Part):
         return self
 
     @property
+    def stiffness_from_radii(self) -> bool:
+        """True when the elastic force follows from the radii of the surfaces."""
+        return self.normal.stiffness is None and self.normal.law != "expression"
+
+    @property
     def radius(self) -> float:
         """Radius of the inner surface [m]."""
         return float(getattr(self, f"{self.surfaces[1]}_radius"))
@@ -206,7 +211,7 @@ class ClearanceRevolute(_Tilting, _Worn):
         if self.collar_radius is not None:
             if self.thrust_radius is not None:
                 raise ValueError("thrust_radius is of crowned faces and collar_radius of flat ones; give one")
-            if self.normal.stiffness is None:
+            if self.stiffness_from_radii:
                 raise ValueError(
                     "the stiffness of flat faces is unknown: give normal.stiffness, or leave out collar_radius"
                 )
@@ -351,7 +356,7 @@ class ClearancePrismatic(_Several, _Clearance):
                 "a guide whose ends touch the slider's faces; leave it out where the slider's corners touch the guide, "
                 'or give faces = "bounded" where it may leave the guide'
             )
-        if self.normal.stiffness is None and not self.corner_radius:
+        if self.stiffness_from_radii and not self.corner_radius:
             raise ValueError("the stiffness of sharp corners is unknown: give normal.stiffness, or corner_radius")
         short = min(filter(None, (self.guide_length or self.length, self.height, self.width)))
         if not 2.0 * self.corner_radius < short:

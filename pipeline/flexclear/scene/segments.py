@@ -63,6 +63,10 @@ def _cut_body(table: dict[str, Any], name: str, body: Mapping[str, Any], where: 
     if body.get("velocity") is not None and any(map(_nonzero, body.get("angular_velocity") or ())):
         problem = "is that of the centre of mass, which a rod in segments that turns does not have before it is meshed"
         raise InputError(f"{where} [body.{name}.velocity]", problem, "give the start rates of a joint")
+    modes = body.get("modes")
+    if isinstance(modes, dict) and (modes.get("interfaces") or modes.get("held")):
+        rule = "the ends of segments are their interfaces"
+        raise InputError(f"{where} [body.{name}.modes]", rule, "leave out modes.interfaces and modes.held")
     names = [f"{name}_{k}" for k in range(1, count + 1)]
     joints = {
         f"{name}_cut_{k}": {"type": "fixed", "between": [f"{one}.cut_{k}", f"{other}.cut_{k}"]}

@@ -8,8 +8,8 @@ than a fraction of the clearance.
 
 The contact is wider than a line: the work in one direction goes to where the surfaces would overlap, in proportion to
 the overlap, as on an elastic foundation. The arc reaches at least one sector to either side.
-Source: Archard (1953), Journal of Applied Physics 24, 981-988; Mukras et al. (2009), Wear 266, 821-831 (extrapolation,
-elastic foundation).
+Source: Archard (1953), Journal of Applied Physics 24, 981-988; Mukras et al. (2009), Wear 266, 822-831
+(extrapolation); Mukras et al. (2010), Journal of Tribology 132, 031604 (elastic foundation).
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.artifacts.quantities import IMPACT, reduce_series
 from flexclear.dynamics import memory as m
+from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.model.merge import find_frame
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record.dataset import attributes, subject
@@ -17,15 +18,16 @@ from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.horizon.exponent import growth, start_direction
 from flexclear.dynamics.run.horizon.tangents import Differentiated, differentiate
-from flexclear.dynamics.run.run import engine_of
+from flexclear.dynamics.run.run import engine_of, observe_run
 from flexclear.dynamics.sensitivity.parameters import Family
 from flexclear.dynamics.sensitivity.recipes import Varied
 from flexclear.dynamics.sensitivity.series import NORMAL_FORCE, Series, derivatives, read_quantities
 from flexclear.scene.event_kinds import CLOSING
 from flexclear.scene.load import with_numbers
+from flexclear.scene.pairs import Corner
 from flexclear.scene.quantity import KINDS, Quantity, Recorded, parse, parse_recorded
 from flexclear.scene.schema import Scene
-from flexclear.system.errors import InputError
+from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress
 
 if TYPE_CHECKING:
@@ -92,6 +94,7 @@ def sensitivities(
     directions = [family.direction(parameter) for parameter in parameters]
     start = consistent_start(engine)
     run = differentiate(engine, start, [*(one for one, _ in directions), start_direction(engine, start)], progress)
+    _require_smooth_faces(engine, run)
     grown = growth(engine, run, len(directions))
     series = {one.quantity.name: one.quantity for one in requested if one.quantity.over_time}
     values = read_quantities(family, engine, run, series.values())
@@ -119,6 +122,29 @@ def sensitivities(
     if np.isfinite(horizon):
         facts |= {"horizon": horizon, "validity": f"up to the predictability horizon, {horizon:.6g} s; beyond it NaN"}
     return xr.Dataset(variables, coordinates, facts)
+
+
+def _require_smooth_faces(engine: Engine, run: Differentiated) -> None:
+    """Raise SolverError where a contact goes from a bounded face to its end, below the edge: its force jumps there."""
+    corners = [(c, one.joint) for c, one in enumerate(engine.model.contacts) if isinstance(one.joint, Corner)]
+    ended = [(c, corner) for c, corner in corners if corner.end]
+    if not ended:
+        return
+    sites, t = observe_run(engine, run.trajectory).sites, run.trajectory.time
+    closed = recording.record(run.trajectory.rows, run.trajectory.contacts).modes == 1
+    for c, corner in ended:
+        outer, inner = (sites[:, engine.model.arrays.table(m.CONTACTS)[side][c]] for side in ("outer", "inner"))
+        place = np.einsum("tji,tj->ti", outer["axes"], inner["origin"] - outer["origin"])
+        past, height = np.abs(place[:, 0]) - corner.end, place[:, 2]
+        # about the edge the force turns steadily for centres outside of it
+        inside = np.maximum(past, height) < 1e-9 * corner.end
+        jumps = np.diff(height >= past) & (inside[1:] | inside[:-1]) & (closed[1:, c] | closed[:-1, c])
+        if np.any(jumps):
+            raise SolverError(
+                f"contact '{engine.model.contacts[c].name}': its corner is pressed past the end of the face at t = "
+                f"{t[1:][jumps][0]:.6g} s, where the force turns at once and the motion has no derivative; give the "
+                "joint a corner_radius above the penetration"
+            )
 
 
 def _with_poses_of_run(scene: Scene, engine: Engine) -> Scene:

@@ -95,7 +95,8 @@ def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, fir
 
 
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    scale = 1.0 / np.sqrt(np.abs(np.diag(matrix)))
+    # a shape's diagonal entry vanishes where its Rayleigh quotient is the frequency
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(matrix)), 1e-9 * np.abs(matrix).max(axis=0)))
     return scale[:, None] * scipy.linalg.solve(scale[:, None] * matrix * scale, scale[:, None] * right)
 
 

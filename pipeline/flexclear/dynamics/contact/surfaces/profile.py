@@ -7,8 +7,8 @@ through the middles of the bands and the mean of the last band at either pole.
 With depths :math:`h` along the line of centres the gap is :math:`g = c + h_o(R_A^T n) + h_i(R_B^T n) - |p|`. Force and
 moment are :math:`N \nabla g` with respect to the position and the orientation of the inner body, so that they do the
 work that the gap's change takes from the contact.
-Source: Flores (2009), Mechanism and Machine Theory 44, 1211-1222 (worn radii by angle); Mukras et al. (2009), Wear 266,
-821-831 (clearance that depends on the direction of the contact).
+Source: Flores (2009), Mechanism and Machine Theory 44, 1211-1222 (worn radii by angle); Mukras et al. (2010), Journal
+of Tribology 132, 031604 (clearance whose shape and size follow from wear).
 """
 
 from __future__ import annotations
