@@ -44,7 +44,7 @@ def write(path: Path, draw: Draw) -> Path:
     """
     import gmsh
 
-    step.start(gmsh)
+    step.start_gmsh(gmsh)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")

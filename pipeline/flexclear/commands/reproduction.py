@@ -21,7 +21,7 @@ from flexclear.scene.toml_files import read_toml
 from flexclear.stages import meshing, scenes
 from flexclear.stages.sweeps.sweep_points import source_digest
 from flexclear.system.errors import FlexclearError, InputError
-from flexclear.system.external_files import companions, require_file
+from flexclear.system.external_files import companion_files, require_file
 from flexclear.system.version import version
 from flexclear.workflow.fingerprint import library_version
 
@@ -129,7 +129,7 @@ def _files_of_scene(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bo
             others += meshing.named_files(read_toml(path), path.parent)
     for path in list(others):
         with contextlib.suppress(FlexclearError):
-            others.extend(companions(path))
+            others.extend(companion_files(path))
     opened = dict.fromkeys((path.resolve() for path in others if is_file(path)), False)
     opened |= dict.fromkeys((path.resolve() for path in texts + recipes if is_file(path)), True)
     folders = (scene.parent, *((DATA / name).resolve() for name in ("scenes", "meshes")))

@@ -30,7 +30,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     Raises InputError for a scene that cannot be built, SolverError when the run cannot continue, StoppedError, with the
     partial run marked as incomplete, when it is stopped.
     """
-    from flexclear.artifacts.labelled import of
+    from flexclear.artifacts.labelled import label_dataset
     from flexclear.dynamics.run.progress_rate import DearError, affordable
     from flexclear.dynamics.single_run import SingleRun
 
@@ -50,11 +50,11 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     from flexclear.dynamics.run.method_choice import accuracy
 
     if not scene.by_need():
-        return of(accuracy.deliver(scene, begun, progress))
+        return label_dataset(accuracy.deliver(scene, begun, progress))
     from flexclear.dynamics.run.method_choice.method_selection import method_costs
 
     if requested:
-        return of(accuracy.deliver(scene, begun, progress, method_costs(scene, bundles)))
+        return label_dataset(accuracy.deliver(scene, begun, progress, method_costs(scene, bundles)))
     if scene.solver.by_need == "integrator":
-        return of(accuracy.at_tolerance(scene, begun, method_costs(scene, bundles)))
-    return of(accuracy.by_default(scene, begun, progress, lambda edited: method_costs(edited, bundles)))
+        return label_dataset(accuracy.at_tolerance(scene, begun, method_costs(scene, bundles)))
+    return label_dataset(accuracy.by_default(scene, begun, progress, lambda edited: method_costs(edited, bundles)))

@@ -88,7 +88,7 @@ def with_line_number(error: InputError) -> InputError:
     """Return the error with the line behind its key path, where a file contains the path; for several errors, each."""
     if isinstance(error, InputErrors):
         return InputErrors([with_line_number(one) for one in error.errors])
-    position = where(error)
+    position = locate_error(error)
     if position is None or _LINE.match(error.place):
         return error
     file, line = position
@@ -106,7 +106,7 @@ def with_file_name(error: InputError, path: Path | None) -> InputError:
     return InputError(f"{path} {error.place}", error.problem, error.remedy)
 
 
-def where(error: InputError) -> tuple[Path, int] | None:
+def locate_error(error: InputError) -> tuple[Path, int] | None:
     """Return file and line of an error's key path, which may be written in a scene that the file extends."""
     if found := _LINE.match(error.place):
         return Path(found["file"]), int(found["line"])

@@ -43,7 +43,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     kept = inputs.get("run", done)
-    recorded = quantities.keep(kept, [parse(name, scene.owners()) for name in params["quantities"]])
+    recorded = quantities.select_variables(kept, [parse(name, scene.owners()) for name in params["quantities"]])
     attributes = {"units": "s", "long_name": "processor time of the integration of a warm run"}
     recorded["cpu_repeat"] = (("repeat",), integration, attributes)
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}

@@ -12,7 +12,7 @@ from flexclear.post.cost.study import (
     Point,
     assemble,
     comparable_until,
-    cost,
+    cost_of_run,
     price_list,
     relative_errors,
     skipped_sentence,
@@ -34,17 +34,23 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
-    chosen = [Quantity.read(data) for data in params["quantities"]]
+    chosen = [Quantity.from_json(data) for data in params["quantities"]]
     points = with_reference(points, runs, chosen)
     study = assemble(points, runs, chosen)
     study.attrs |= params["own"] | {"undone": params["undone"], "complete": int(params["complete"])}
     asis = next(runs[p.key] for p in points if p.key == "as it is")
-    study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
+    study.attrs |= {
+        "own_seconds": cost_of_run(asis, "cpu_seconds"),
+        "own_evaluations": cost_of_run(asis, "evaluations"),
+    }
     title = params["title"]
     notes = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
     notes += (*skipped_sentence(study),)
     reference = runs[next(p.key for p in points if p.group == "reference")]
     errors = relative_errors(asis, reference, chosen, comparable_until(points, runs))
-    mark, others = Mark("this scene", cost(asis, "cpu_seconds"), errors), work_precision.peers(study, params["peers"])
+    mark, others = (
+        Mark("this scene", cost_of_run(asis, "cpu_seconds"), errors),
+        work_precision.peers(study, params["peers"]),
+    )
     figure = work_precision.make("work_precision", study, f"Error against cost: {title}", (mark,), others)
     return {"nc": study} | files("price", price_list(study, f"What accuracy costs: {title}", notes)) | figure

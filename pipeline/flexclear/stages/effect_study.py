@@ -53,7 +53,7 @@ def task(
     shared = {
         "title": scene.title,
         "looser": integrated.looser,
-        "quantities": [q.written() for q in chosen],
+        "quantities": [q.to_json() for q in chosen],
         "units": [q.unit for q in chosen],
         "outputs": [scene.time.start, scene.output.interval],
         "variants": [sorted(names) for names in variants],
@@ -81,7 +81,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     """
     from flexclear.post.answers import effect_sizes
 
-    chosen = [Quantity.read(data) for data in params["quantities"]]
+    chosen = [Quantity.from_json(data) for data in params["quantities"]]
     every = [frozenset(names) for names in params["variants"]]
     points = {gone: _point(params, inputs, gone, chosen) for gone in every}
     progress(None, "comparing")
@@ -105,7 +105,7 @@ def effect_ranking(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], 
     """
     from flexclear.post.answers import effect_ranking as ranked
 
-    chosen = [Quantity.read(data) for data in params["quantities"]]
+    chosen = [Quantity.from_json(data) for data in params["quantities"]]
 
     def pair(name: str, members: int) -> ranked.Pair:
         gone = frozenset(params["removed"][name])
@@ -180,6 +180,6 @@ def _error_of(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Ca
             or not quantities.has_quantity(tight, quantity)
         ):
             return 0.0
-        return float(params["looser"]) * quantities.error(own, tight, quantity, until)
+        return float(params["looser"]) * quantities.largest_distance(own, tight, quantity, until)
 
     return error

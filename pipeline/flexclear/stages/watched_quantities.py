@@ -44,7 +44,7 @@ def tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list[Task]:
             run="flexclear.stages.watched_quantities:run",
             params={
                 "simulate": simulation.params(variant),
-                "quantities": [q.written() for q in chosen],
+                "quantities": [q.to_json() for q in chosen],
                 "members": [first, end],
             },
             inputs=graph.bodies(),
@@ -66,10 +66,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     `members` is the number of runs.
     """
     from flexclear.artifacts.effect_size import compared_values
-    from flexclear.artifacts.points import batch
+    from flexclear.artifacts.points import dataset_of_batch
 
     scene = simulation.rebuild(params["simulate"], inputs)
-    chosen = [Quantity.read(data) for data in params["quantities"]]
+    chosen = [Quantity.from_json(data) for data in params["quantities"]]
     progress(None, f"{scene.summary()}")
     reduced, begun = simulation.bundles(inputs), kernels.processor_time()
     with suppress(SolverError, InputError):  # which the point reports
@@ -82,7 +82,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         "compile_seconds": compiled - begun,
         "cpu_seconds": kernels.processor_time() - compiled,
     }
-    return {"nc": batch({"point": point}, compared_values(scene.owners(), chosen)).assign_attrs(spent)}
+    return {"nc": dataset_of_batch({"point": point}, compared_values(scene.owners(), chosen)).assign_attrs(spent)}
 
 
 def watch(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexclear.artifacts.store import publish
 from flexclear.post.pages import Part, page
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import EFFECTS, ideal, replaceable_contacts
+from flexclear.scene.variants import EFFECTS, ideal_scene, replaceable_contacts
 from flexclear.stages.graph import Graph
 from flexclear.stages.scenes import joint_folder_name, pictures, tables
 from flexclear.stages.workplace import Made, Workplace, check, open_workplace
@@ -79,7 +79,7 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
     for effects in sets.get(without, ((without,),)):
         present = [e for e in effects if (replaceable_contacts(scene) if e == "clearance" else scene.flexible())]
         if present or not ideals:
-            made = ideal(scene, effects)
+            made = ideal_scene(scene, effects)
             same = any(made.model_dump() == other.model_dump() for other in ideals)
             made._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
             ideals += [] if same else [made]
@@ -95,7 +95,7 @@ def parts(made: Made) -> list[Part]:
 
 
 def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
-    quantities = {q.name: q.written() for graph in graphs.values() for q in graph.scene.watched_quantities()}
+    quantities = {q.name: q.to_json() for graph in graphs.values() for q in graph.scene.watched_quantities()}
     labels = list(graphs)
     inputs = {f"run{k}": graphs[label].simulate for k, label in enumerate(labels)}
     inputs |= {f"tight{k}": tight[label] for k, label in enumerate(labels) if label in tight}

@@ -122,7 +122,7 @@ class Study:
             run="flexclear.stages.cost_study:run",
             params={
                 "points": listed,
-                "quantities": [q.written() for q in self._chosen],
+                "quantities": [q.to_json() for q in self._chosen],
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
                 "complete": self._complete and not self.undone,

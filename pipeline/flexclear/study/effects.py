@@ -117,4 +117,4 @@ def _removed(scene: Scene, effects: Sequence[Effect], ideal: str) -> dict[str, N
 
 def _without(scene: Scene, effects: Sequence[Effect], gone: Names, setting: Setting, *, tight: bool = False) -> Scene:
     """Return the scene without effects, by the method of its own run; tight: as of `with_setting`."""
-    return with_setting(variants.without(scene, [e for e in effects if e.name in gone]), setting, tight=tight)
+    return with_setting(variants.without_effects(scene, [e for e in effects if e.name in gone]), setting, tight=tight)

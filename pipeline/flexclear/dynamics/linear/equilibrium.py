@@ -27,11 +27,11 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics.linear.bench import (
     Bench,
+    advance_drives,
     approach_in_steps,
     balance,
     close,
     hold,
-    moved_on,
     set_drives,
 )
 from flexclear.dynamics.linear.floquet import PROBE, small_motions
@@ -80,7 +80,7 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
 
     Motions that nothing holds there, such as that of a roller about its pin, end where they began.
     """
-    rest = _descended(bench, tangent(bench, q))
+    rest = _follow_forces(bench, tangent(bench, q))
     for _ in range(RETURNS):
         at = rest.at
         K, _ = stiffness(bench, at, at.Z)
@@ -89,11 +89,11 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
         back = free @ (free.T @ at.mass @ np.linalg.lstsq(at.moves, q - at.q, rcond=None)[0])
         if not SHORT_MOVE < np.max(np.abs(back) / bench.model.speed_scales, initial=0.0) < LONGEST_MOVE:
             break
-        rest = _descended(bench, tangent(bench, close(bench, at.q + at.moves @ back)))
+        rest = _follow_forces(bench, tangent(bench, close(bench, at.q + at.moves @ back)))
     return rest
 
 
-def _descended(bench: Bench, at: Tangent) -> Equilibrium:
+def _follow_forces(bench: Bench, at: Tangent) -> Equilibrium:
     """Return the equilibrium to which forces lead from a pose."""
     best, since = np.inf, 0
     for iteration in range(MOST_MOVES):
@@ -303,7 +303,7 @@ def _is_steady(bench: Bench, at: Tangent) -> bool:
     loops = float(np.max(np.abs(before.slip) / units, initial=0.0))
     if loops > STEADY * fastest:
         return False
-    with moved_on(bench, PROBE / fastest) as later:
+    with advance_drives(bench, PROBE / fastest) as later:
         after = balance(later, at.q)
         forces = max(forces, after.moment)
     change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))

@@ -18,7 +18,7 @@ import xarray as xr
 from flexclear.artifacts import effect_size
 from flexclear.artifacts.labelled import Labelled
 from flexclear.artifacts.points import Point
-from flexclear.dynamics.linear.clearance_response import OF_POSE, bounds
+from flexclear.dynamics.linear.clearance_response import OF_POSE, bound_effects
 from flexclear.dynamics.linear.response import Response, response
 from flexclear.dynamics.plan.budget import BUDGET, UNCHANGED, WHOLE, Chosen, Search, upper_bounds, widened
 from flexclear.dynamics.plan.impacts import cheapest, decide_bending
@@ -109,9 +109,9 @@ def _requested(
                 raise SolverError(f"{scene.name}: a simpler mechanism cannot be run: {point.refused}")
             if _has(point, q):
                 break
-        sizes[q.name] = effect_size.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
+        sizes[q.name] = effect_size.reference_size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
         want = scene.accuracy.quantities[q.name]
-        if want.absolute is None and sizes[q.name] <= effect_size.rounding(point, q):
+        if want.absolute is None and sizes[q.name] <= effect_size.rounding_threshold(point, q):
             constant.append(q.name)
         else:
             accuracies[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
@@ -126,7 +126,7 @@ def _requested(
     if all(accuracies[name] >= size for name, size in sizes.items()):
         # forces and rates may come from impacts alone
         more = simpler[1 if scene.contacts() or scene.stops() else 0]()
-        there = {q.name: effect_size.size(more, q) for q in quantities if _has(more, q)}
+        there = {q.name: effect_size.reference_size(more, q) for q in quantities if _has(more, q)}
         sizes = {name: max(size, there.get(name, 0.0)) for name, size in sizes.items()}
     if all(accuracies[name] >= size for name, size in sizes.items()):
         q = quantities[0]
@@ -161,7 +161,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
         return
     runs, bounded = search.runs, dict[str, Mapping[str, float]]()
     if rigid is not None and any(q.kind in OF_POSE for q in runs.chosen):
-        bounded = dict(bounds(runs.scene, rigid, runs.chosen))
+        bounded = dict(bound_effects(runs.scene, rigid, runs.chosen))
     reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
     total = summed(reach.values(), search.requested)
     if search.fits(total, BY_BOUND):

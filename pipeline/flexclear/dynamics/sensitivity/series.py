@@ -18,7 +18,7 @@ from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.horizon.tangents import Differentiated
 from flexclear.dynamics.run.run import observe_run
-from flexclear.dynamics.sensitivity.parameters import Family, Parameter, central
+from flexclear.dynamics.sensitivity.parameters import Family, Parameter, central_difference
 from flexclear.scene.quantity import Quantity
 
 #: steps along a direction are powers of ten, from this one [its unit] to that of its start; each changes no quantity by
@@ -56,7 +56,7 @@ def derivatives(
             for j in (-2, -1, 1, 2)
         }
         for name in around[1]:
-            change = central({j: values[name] for j, values in around.items()}, step)
+            change = central_difference({j: values[name] for j, values in around.items()}, step)
             result.setdefault(name, np.zeros((len(run.trajectory.rows), change.shape[1])))[rows] = change
     return result
 

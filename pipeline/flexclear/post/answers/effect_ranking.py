@@ -19,10 +19,10 @@ from flexclear.artifacts.effect_size import (
     REAL,
     Influence,
     chance,
-    change,
     early_changes,
+    influence_of_removal,
     over_run,
-    size,
+    reference_size,
 )
 from flexclear.artifacts.points import Point
 from flexclear.post.answers.effect_sizes import (
@@ -62,7 +62,7 @@ class Pair:
 
 def influence_of(pair: Pair, quantity: Quantity) -> Influence:
     """Return the change by the effect; nan where a run was refused."""
-    return change(pair.without, pair.full, quantity, pair.members)
+    return influence_of_removal(pair.without, pair.full, quantity, pair.members)
 
 
 def is_decided(change: Influence, scale: float) -> bool:
@@ -76,7 +76,7 @@ def undecided_quantities(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantit
     """Return the quantities whose verdict beyond the horizon further members may change."""
     if pair.full.refused or pair.without.refused:
         return []
-    return [q for q in chosen if not is_decided(influence_of(pair, q), size(pair.full, q))]
+    return [q for q in chosen if not is_decided(influence_of(pair, q), reference_size(pair.full, q))]
 
 
 def assemble(
@@ -101,7 +101,7 @@ def assemble(
         for pair, (_, row) in zip(pairs.values(), begun, strict=True)
     ]
     full = next(iter(pairs.values())).full
-    scales = [size(full, q) if not full.refused else np.nan for q in chosen]
+    scales = [reference_size(full, q) if not full.refused else np.nan for q in chosen]
     differences = np.array([[c.difference for c in row] for row in changes])
     uncertainties = np.array([[c.uncertainty for c in row] for row in changes])
     dims = ("effect", "quantity")
@@ -134,16 +134,15 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
         early, whole = (Influence(float(one[kind][k]), float(one[f"{kind}_uncertainty"][k])) for kind in kinds)
         if np.isfinite(whole.difference):
             unit, scale = str(result["unit"].values[k]), float(result["size"][k])
-            text = in_words(whole, scale, unit)
+            text = change_in_words(whole, scale, unit)
             if np.isfinite(until):
-                text = (
-                    f"up to t = {in_unit(until, 's')} it {in_words(early, scale, unit)}; over the whole run it {text}"
-                )
+                first = change_in_words(early, scale, unit)
+                text = f"up to t = {in_unit(until, 's')} it {first}; over the whole run it {text}"
             sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
     return sentences
 
 
-def in_words(change: Influence, scale: float, unit: str) -> str:
+def change_in_words(change: Influence, scale: float, unit: str) -> str:
     """Return a phrase on the change from the ideal mechanism, as HTML. scale: of the quantity."""
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree within <b class='n'>{in_unit(change.most, unit)}</b>"
@@ -179,17 +178,17 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
             np.array([requested.get(str(q), np.inf) for q in result["quantity"].values]),
         )
     reached = single["horizon"].values[np.isfinite(single["horizon"].values)]
-    certain, possible = _called_for(single, limits)
+    certain, possible = _effects_above_limits(single, limits)
     needs = f"model {join_names(certain)}" if certain else "no effect is certain to be needed"
     needs = needs if certain or possible else "no effect is needed"
     beyond = " beyond the horizon" if reached.size else ""
     sentences = [f"For {name}, {needs}{f' (undecided{beyond}: {join_names(possible)})' if possible else ''}."]
-    sentences += [_parts(single, reached)] if reached.size else []
+    sentences += [_early_and_whole_sentence(single, reached)] if reached.size else []
     sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + last)
 
 
-def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
+def _early_and_whole_sentence(single: xr.Dataset, reached: np.ndarray) -> str:
     """Return a sentence on the answer's two parts: up to the horizons [s] and over the whole run."""
     words = [str(w) for w in single["words"].values]
     changes = [
@@ -201,7 +200,7 @@ def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
     beyond = [w for w, sure in zip(words, single["decided"].values, strict=True) if not sure.all()]
     members = int(single["members"].max())
     until = " to ".join(dict.fromkeys(in_unit(time, "s") for time in (reached.min(), reached.max())))
-    more = [enough for enough, _ in (_deciding(single, i) for i in range(len(words))) if enough]
+    more = [enough for enough, _ in (_deciding_members(single, i) for i in range(len(words))) if enough]
     said = f"undecided for {join_names(left)}" if left else "decided for each effect"
     text = f"Up to the horizon, t = {until}, all runs of a variant are one motion, and its change is {said}"
     if not beyond:
@@ -212,7 +211,7 @@ def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
     )
 
 
-def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
+def _effects_above_limits(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
     """Return effects whose change certainly exceeds its limit, up to the horizon or beyond it, and effects whose change
     may exceed it by chance."""
     change, chance = single["dropped"].values, single["dropped_uncertainty"].values
@@ -226,7 +225,7 @@ def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list
     ]
 
 
-def _deciding(result: xr.Dataset, i: int) -> tuple[int, str]:
+def _deciding_members(result: xr.Dataset, i: int) -> tuple[int, str]:
     """Return how many members would decide what is undecided of an effect, 0 for none, and a cell of a table on it."""
     members = int(result["members"][i])
     changes = [
@@ -256,7 +255,7 @@ def table(result: xr.Dataset) -> Table:
         if np.isfinite(until):
             early = [cell(result, "early", (i, k), unit) for k, unit in enumerate(units)]
             rows.append((f"{words}, up to {in_unit(until, 's')}", *early, "one motion"))
-            rows.append((f"{words}, whole run", *cells, _deciding(result, i)[1]))
+            rows.append((f"{words}, whole run", *cells, _deciding_members(result, i)[1]))
         else:
             rows.append((words, *cells, str(members) if members else "one run"))
     notes = ["Largest change of each quantity without the effect. The number after ± or < may be due to chance."]

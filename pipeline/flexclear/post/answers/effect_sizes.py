@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.effect_size import Influence, change, early_changes, influence, over_run
+from flexclear.artifacts.effect_size import Influence, early_changes, influence, influence_of_removal, over_run
 from flexclear.artifacts.points import Point
 from flexclear.post.overview.curves import format_with_error, in_unit
 from flexclear.post.plotting.table import Table
@@ -90,10 +90,10 @@ def assemble(
             if i == j:
                 begun.append(early_changes(lost, full, chosen, members, times, error))
             for k, quantity in enumerate(chosen):
-                variables = {"dropped": change(lost, full, quantity, members)}
+                variables = {"dropped": influence_of_removal(lost, full, quantity, members)}
                 if i == j:
                     variables["dropped"] = over_run(variables["dropped"], begun[i][1][k], quantity)
-                variables["added"] = change(gained, bare, quantity, members)
+                variables["added"] = influence_of_removal(gained, bare, quantity, members)
                 if independent:
                     variables["interaction"] = _interaction(gained, single, bare, quantity, members)
                 for name, value in variables.items():
@@ -246,7 +246,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
     early = "added" not in dataset and "early" in dataset and bool(np.isfinite(dataset["horizon"].values).any())
     kinds = [kind for kind in ("dropped", "added", "early") if kind in dataset and (early or kind != "early")]
-    with style.style():
+    with style.set_style():
         figure, axes = style.panels(len(chosen), min(2, len(chosen)), 10.0, 1.1, 0.9 + 0.3 * len(names), sharey=True)
         for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):

@@ -116,7 +116,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
         distance = over(lambda run: np.nan if asis is None else errors(run, asis), each)
         data[f"error_by_{group}"] = ((*factors, "quantity"), over(errors, each))
         data[f"distance_by_{group}"] = ((*factors, "quantity"), distance)
-        data |= {f"{name}_by_{group}": (factors, over(partial(cost, name=name))) for name in COSTS}
+        data |= {f"{name}_by_{group}": (factors, over(partial(cost_of_run, name=name))) for name in COSTS}
     if asis is not None and "refused" not in asis.attrs:
         data["own_error"] = (("quantity",), errors(asis) + np.nan_to_num(floor))
     attributes = {
@@ -168,7 +168,7 @@ def _over_factors(
     return result
 
 
-def cost(run: xr.Dataset, name: str) -> float:
+def cost_of_run(run: xr.Dataset, name: str) -> float:
     """Return one of COSTS of a point's run."""
     seconds = run["cpu_repeat"].values
     if name == "cpu_seconds":
@@ -178,7 +178,7 @@ def cost(run: xr.Dataset, name: str) -> float:
     return float(run.attrs[name])
 
 
-def recording(study: xr.Dataset) -> float:
+def median_recording_time(study: xr.Dataset) -> float:
     """Return processor time of the record of one run [s]: the same for each integration's rows, so one median."""
     times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in GROUPS
              if f"recording_seconds_by_{group}" in study]  # fmt: skip
@@ -191,7 +191,8 @@ def relative_errors(
 ) -> dict[str, float]:
     """Return the largest errors up to a time [s] as fractions of the quantities' sizes, by name."""
     return {
-        q.name: relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen
+        q.name: relative_error(quantities.largest_distance(run, reference, q, until), quantities.scale(reference, q))
+        for q in chosen
     }
 
 
@@ -203,7 +204,7 @@ def comparable_until(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) ->
     return min((float(runs[p.key]["horizon"]) for p in points if "horizon" in runs[p.key]), default=np.inf)
 
 
-def relative(error: float, scale: float) -> float:
+def relative_error(error: float, scale: float) -> float:
     """Return an error as a fraction of a size; the error itself for a size of zero."""
     return error / scale if scale > 0.0 else error
 
@@ -217,7 +218,7 @@ def sentences(study: xr.Dataset) -> str:
     return " ".join(filter(None, (_own_method_sentence(study), _digit(study), *skipped_sentence(study))))
 
 
-def _worst(study: xr.Dataset) -> tuple[str, float]:
+def _worst_own_error(study: xr.Dataset) -> tuple[str, float]:
     """Return quantity and size that the largest error refers to, in words, and that error."""
     errors = study["own_error"].values
     k = int(np.argmax(errors))
@@ -225,7 +226,7 @@ def _worst(study: xr.Dataset) -> tuple[str, float]:
 
 
 def _own_method_sentence(study: xr.Dataset) -> str:
-    of, error = _worst(study)
+    of, error = _worst_own_error(study)
     setting = (
         f"rtol {study.attrs['own_rtol']:g}" if "own_rtol" in study.attrs else f"steps of {study.attrs['own_step']:g} s"
     )
@@ -243,7 +244,7 @@ def _own_method_sentence(study: xr.Dataset) -> str:
 
 def _digit(study: xr.Dataset) -> str:
     """Return a sentence on the cost of one more digit."""
-    _, error = _worst(study)
+    _, error = _worst_own_error(study)
     better = cheapest(study, 0.1 * error) if np.isfinite(error) else None
     if better is None:
         return "One more digit was not reached within the budget." if np.isfinite(error) else ""
@@ -269,7 +270,7 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
         choice = cheapest(study, target)
         if choice is None:
             best = min(choices(study), key=lambda c: c.error, default=NOTHING)
-            rows.append((f"{target:g}", _absent(study), "–", "–", f"{best.error:.1e} at best", best.worst))
+            rows.append((f"{target:g}", _unreached_text(study), "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
             seconds = f"{choice.seconds:.3f}"
             rows.append(
@@ -278,7 +279,7 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
     return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
 
 
-def _absent(study: xr.Dataset) -> str:
+def _unreached_text(study: xr.Dataset) -> str:
     """Return the words for an accuracy that no run of a study has."""
     return "cannot be reached" if study.attrs.get("complete", 1) else "not reached yet"
 

@@ -14,8 +14,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flexclear.post.cost.study import MARGIN, is_resolved, methods, recording
-from flexclear.post.plotting.style import GRID, INK, SOFT, files, heading, panels, scale_of, set_plain_numbers, style
+from flexclear.post.cost.study import MARGIN, is_resolved, median_recording_time, methods
+from flexclear.post.plotting.style import (
+    GRID,
+    INK,
+    SOFT,
+    files,
+    heading,
+    panels,
+    scale_of,
+    set_plain_numbers,
+    set_style,
+)
 from flexclear.scene.integrators import INTEGRATORS
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
@@ -51,8 +61,8 @@ def make(
     """Draw ``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
     drawn = curves(study)
-    recorded = recording(study)
-    with style():
+    recorded = median_recording_time(study)
+    with set_style():
         figure, axes = panels(len(chosen), COLUMNS, 10.5, 1.1, 2.7)
         for k, ax in enumerate(axes):
             _panel(ax, chosen[k], k, (drawn, others), marks, MARGIN * float(study["reference_uncertainty"].values[k]))

@@ -17,7 +17,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 
-from flexclear.post.body_shape import AROUND, circle, faces, hertz, is_rod, scale_to, surface
+from flexclear.post.body_shape import AROUND, circle, faces, format_frequency, is_rod, scale_to, surface
 from flexclear.post.plotting import style
 from flexclear.post.plotting.style import INK, SOFT
 
@@ -128,13 +128,13 @@ FRAMES = 16
 
 def files(name: str, body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> dict[str, bytes]:
     """Draw ``<name>.png`` and ``<name>.svg`` of all modes of a body (schema BUNDLE), seen from a direction."""
-    with style.style():
+    with style.set_style():
         return style.files(name, _sheet(body, bundle, view(towards, up), 1.0))
 
 
 def film_frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> Iterator[np.ndarray]:
     """Yield pictures of one vibration of all modes, shape (height, width, 3)."""
-    with style.style():
+    with style.set_style():
         camera = view(towards, up)
         drawn: dict[float, np.ndarray] = {}  # both halves of a swing look alike
         for phase in np.linspace(0.0, 2.0 * np.pi, FRAMES, endpoint=False):
@@ -210,5 +210,5 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, camera: View, mode: int, fracti
     edge = 0.03 * float((high - low).max())
     panel.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
     panel.set_axis_off()
-    text = hertz(float(bundle["frequency"].values[mode]))
+    text = format_frequency(float(bundle["frequency"].values[mode]))
     panel.set_title(f"mode {mode + 1}: {text}, × {factor:.2g} √kg m", fontsize=8.8)

@@ -212,7 +212,7 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
     lines = np.array([few_lines(component) for component in shown.T])
     largest_K = float(np.nanmax(K)) if np.isfinite(K).any() else float("nan")
     discrete = float(lines.min())
-    kind, reasons = _rule(rate, least, after, distance, largest_K, discrete)
+    kind, reasons = _apply_rules(rate, least, after, distance, largest_K, discrete)
     if len(states) < ENOUGH and kind != "periodic":
         kind, reasons = "undecided", (f"{len(states)} sections are too few, {ENOUGH} are needed", *reasons)
     numbers = {
@@ -229,7 +229,7 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
     return Verdict(kind, reasons, numbers, shown)
 
 
-def _rule(
+def _apply_rules(
     rate: Interval, least: float, after: int, distance: float, K: float, discrete: float
 ) -> tuple[Kind, tuple[str, ...]]:
     text = f"largest exponent {rate.mean:.3g} 1/s, 95 % between {rate.low:.3g} and {rate.high:.3g}"

@@ -130,28 +130,28 @@ def _rod(mesh: xr.Dataset, beam: Beam) -> Slices:
     x = np.asarray(beam.basis.global_coordinates())[0].ravel()
     start = beam.node_position[0] - R[:, 0] * mesh["abscissa"].values[0]
     J = at_points(mesh, "inertia_moment") * weight[..., None]
-    rigid = spread(J.reshape(-1, 1, 3) * np.eye(3))
+    rigid = second_moments(J.reshape(-1, 1, 3) * np.eye(3))
     rigid[:, 1, 2] = rigid[:, 2, 1] = (per_point(mesh, "inertia_product") * weight).ravel()
     rigid = np.einsum("ik,pkl,jl->pij", R, rigid, R)
     mass, position = (weight * at_points(mesh, "area")).ravel(), start + np.outer(x, R[:, 0])
     centred = np.zeros_like(position)
     if J[..., 1:].any():
-        return Slices(mass, position, rigid, motion(beam), rigid, centred)
+        return Slices(mass, position, rigid, section_motion(beam), rigid, centred)
     area = at_points(mesh, "second_moment")
     scale = (J[..., 0] / (area[..., 1] + area[..., 2])).ravel()
     D = np.zeros_like(rigid)
     D[:, 1, 1], D[:, 2, 2] = scale * area[..., 2].ravel(), scale * area[..., 1].ravel()
     D[:, 1, 2] = D[:, 2, 1] = scale * per_point(mesh, "product_moment").ravel()
-    return Slices(mass, position, np.einsum("ik,pkl,jl->pij", R, D, R), motion(beam, tilts=0.0), rigid, centred)
+    return Slices(mass, position, np.einsum("ik,pkl,jl->pij", R, D, R), section_motion(beam, tilts=0.0), rigid, centred)
 
 
-def spread(inertia: np.ndarray) -> np.ndarray:
+def second_moments(inertia: np.ndarray) -> np.ndarray:
     """Return D of bodies with these inertias about their centres of mass, both of shape (p, 3, 3)."""
     result: np.ndarray = 0.5 * np.trace(inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - inertia
     return result
 
 
-def motion(beam: Beam, tilts: float = 1.0) -> sp.csr_array:
+def section_motion(beam: Beam, tilts: float = 1.0) -> sp.csr_array:
     """Return the motion of the section at all Gauss points; tilts: 0 for sections that only twist about the rod."""
 
     def section(*fields: Any) -> tuple[Any, ...]:
@@ -182,7 +182,7 @@ def fields_at_points(beam: Beam, fields: Callable[..., tuple[Any, ...]]) -> sp.c
 def _lumps(mesh: xr.Dataset, size: int) -> Slices:
     nodes, offset = mesh["lump_node"].values, mesh["lump_offset"].values
     position = mesh["node_position"].values[nodes] + offset
-    D, moved = spread(mesh["lump_inertia"].values), at_centres(selection(node_dofs(nodes), size), offset)
+    D, moved = second_moments(mesh["lump_inertia"].values), at_centres(selection(node_dofs(nodes), size), offset)
     return Slices(mesh["lump_mass"].values, position, D, moved, D, offset)
 
 

@@ -35,12 +35,14 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
     model = flexibility.model
     none = sp.csr_array((0, model.size))
     count = min(COMPARED, model.size - 6)
-    free = normal.frequency(normal.lowest(model, none, count, lambda: flexibility, progress).values)[:count]
+    free = normal.eigenvalues_to_hz(normal.lowest_modes(model, none, count, lambda: flexibility, progress).values)[
+        :count
+    ]
     data = {"free_frequency": (("free_mode",), free)}
     mass, centre, inertia = rigid_properties(model)
     stated = float(mesh["listed_mass"]) if "listed_mass" in mesh else float(mesh.get("body_mass", np.nan))
     if "listed_frequency" in mesh:
-        listed = _elastic(mesh["listed_frequency"].values, free)[:count]
+        listed = _elastic_frequencies(mesh["listed_frequency"].values, free)[:count]
         data["listed_frequency"] = (("listed",), listed)
         _require_same("frequency 1 of the free body", free[0], listed[0], "Hz")
     if np.isfinite(stated):
@@ -82,7 +84,7 @@ def rigid_properties(model: Model) -> tuple[float, np.ndarray, np.ndarray]:
     return mass, model.position.mean(axis=0) + lever, inertia
 
 
-def _elastic(listed: np.ndarray, free: np.ndarray) -> np.ndarray:
+def _elastic_frequencies(listed: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Return the listed frequencies without those of rigid motions; raise InputError unless some are left."""
     elastic = listed[6:]
     if len(elastic) == 0 or np.any(listed[:6] > RIGID * elastic[0]):

@@ -57,7 +57,14 @@ def arrays(path: Path, where: str) -> dict[str, np.ndarray]:
         raise InputError(where, problem, "pip install 'flexclear[fe]'")
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "arrays.npz"
-        command = [sys.executable, "-c", SCRIPT, str(path.resolve()), str(target), str(ADDRESSES + machine.memory())]
+        command = [
+            sys.executable,
+            "-c",
+            SCRIPT,
+            str(path.resolve()),
+            str(target),
+            str(ADDRESSES + machine.available_memory()),
+        ]
         done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False)
         if not target.is_file():
             raise ValueError((done.stderr.strip().splitlines() or [f"its reader ended with {done.returncode}"])[-1])

@@ -80,13 +80,13 @@ class StepFile(Part):
     """type of the cells"""
 
 
-def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+def _require_direction(direction: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(direction):
         raise ValueError("a direction must not have length zero")
     return direction
 
 
-Pointing = Annotated[Direction, AfterValidator(_pointing)]
+Pointing = Annotated[Direction, AfterValidator(_require_direction)]
 
 
 class Plane(Part):

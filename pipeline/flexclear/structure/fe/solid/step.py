@@ -21,7 +21,7 @@ from flexclear.structure.fe.solid.geometry import Geometry
 from flexclear.structure.fe.solid.recipe import StepFile
 from flexclear.system import machine
 from flexclear.system.errors import InputError
-from flexclear.system.external_files import reading, require_file
+from flexclear.system.external_files import convert_reader_errors, require_file
 
 #: Gmsh's number of each element, and its nodes in the order of VTK
 ELEMENTS = {"tet4": (4, (0, 1, 2, 3)), "tet10": (11, (0, 1, 2, 3, 4, 5, 6, 7, 9, 8))}
@@ -66,7 +66,7 @@ class Solid:
     rounds: tuple[Round, ...]
 
 
-def start(gmsh: Any) -> None:
+def start_gmsh(gmsh: Any) -> None:
     """Start Gmsh, which would let a closed pipe end this process from then on; Python makes an error of it."""
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
@@ -83,12 +83,12 @@ def open_step(path: Path, where: str) -> Iterator[Any]:
     except (ImportError, OSError) as error:
         reason = "" if isinstance(error, ImportError) else f" ({error})"
         raise InputError(where, f"STEP files need Gmsh{reason}", "pip install 'flexclear[cad]'") from None
-    start(gmsh)
+    start_gmsh(gmsh)
     try:
         for option, value in (("General.Terminal", 0), ("General.NumThreads", 1), ("General.AbortOnError", 2)):
             gmsh.option.setNumber(option, value)
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-        with reading(path, where, f"Gmsh cannot read '{path.name}'", "export it as STEP AP214 or AP242"):
+        with convert_reader_errors(path, where, f"Gmsh cannot read '{path.name}'", "export it as STEP AP214 or AP242"):
             if not path.read_bytes()[:200].lstrip().startswith(b"ISO-10303-21"):
                 raise ValueError("it does not begin as a STEP file does")
             gmsh.model.occ.importShapes(str(path), format="step")
@@ -115,7 +115,9 @@ def mesh_step_file(shape: StepFile, folder: Path, where: str) -> Geometry:
         options = {"MeshSizeMax": shape.size, "MeshSizeFromCurvature": AROUND, "ElementOrder": order}
         for option, value in {**options, "HighOrderOptimize": order - 1, "RandomSeed": 1}.items():
             gmsh.option.setNumber(f"Mesh.{option}", value)
-        with reading(path, where, f"Gmsh cannot mesh '{path.name}'", "a smaller size, or repair the solid"):
+        with convert_reader_errors(
+            path, where, f"Gmsh cannot mesh '{path.name}'", "a smaller size, or repair the solid"
+        ):
             gmsh.model.mesh.generate(3)
         number, vtk = ELEMENTS[shape.element]
         _, nodes = gmsh.model.mesh.getElementsByType(number, mine)
