@@ -146,7 +146,7 @@ def findings() -> Iterator[tuple[str, str, bool | None]]:
     versions = {name: library_version(name) for name in (*LIBRARIES, *OPTIONAL)}
     missing = [name for name in LIBRARIES if versions[name] == "absent"]
     yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), not missing
-    yield "memory", f"{machine.size_text(machine.available_memory())} free", machine.memory() > LITTLE_MEMORY
+    yield "memory", f"{machine.size_text(machine.available_memory())} free", machine.available_memory() > LITTLE_MEMORY
     yield "results", *_describe_results(results_root())
     yield "kernels", *_describe_kernels()
     yield "graphics", *_describe_graphics()

@@ -154,7 +154,7 @@ class Column(Part):
 
     @field_validator("unit")
     @classmethod
-    def _known(cls, text: str) -> str:
+    def _require_known_unit(cls, text: str) -> str:
         if text != "1" and unit(text) is None:
             raise ValueError(f"{unknown_unit_message(text)}; 1 is the unit of a number")
         return text

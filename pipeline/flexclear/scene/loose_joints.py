@@ -197,7 +197,7 @@ class ClearanceRevolute(_Tilting, _Worn):
     """number of points all around at which flat faces of the collars may touch; default: 8"""
 
     @model_validator(mode="after")
-    def _tilting(self) -> Self:
+    def _require_keys_of_collars(self) -> Self:
         given = next((key for key in ("thrust_radius", "collar_radius") if getattr(self, key) is not None), "")
         if self.axial_clearance is None and given:
             raise ValueError(f"{given} is of collars, which need an axial_clearance; give both or neither")
@@ -336,7 +336,7 @@ class ClearancePrismatic(_Several, _Clearance):
     """elastic constants, for the stiffness"""
 
     @model_validator(mode="after")
-    def _fitting(self) -> Self:
+    def _require_keys_of_faces(self) -> Self:
         if (self.width is None) != (self.side_clearance is None):
             given, absent = ("width", "side_clearance") if self.width is not None else ("side_clearance", "width")
             raise ValueError(

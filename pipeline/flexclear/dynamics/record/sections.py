@@ -75,7 +75,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
             orbit = tape.orbit(parts, done)
             break
         if stored is not None:  # packed now: a failure in the next period would leave the tape half changed
-            state = {**memory(engine), **done.after.pack(), **tape.packed()}
+            state = {**memory(engine), **done.after.packed(), **tape.pack()}
             stored.store(name, lambda state=state: state)  # type: ignore[misc]
     growth, lost = np.array(tape.columns["growth"][: len(followed)]), int(sum(tape.columns["lost"]))
     facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": lost}

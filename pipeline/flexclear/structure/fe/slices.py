@@ -54,13 +54,13 @@ def integrate(body: Slices, vectors: np.ndarray) -> Integrals:
     """Return all invariants for vectors of shape (ndof, n); exact but for rounding."""
     m, X, D = body.mass, body.position.T, body.spread
     s, theta = _motion_of_slices(body, vectors)
-    mode_mode = _mode_mode(m, s)
+    mode_mode = _products_of_modes(m, s)
     position_mode = np.einsum("p,kp,lpj->klj", m, X, s)
     # principal directions of each slice: three weighted motions, instead of nine products of axes
     weights, directions = np.linalg.eigh(D)
     for weight, d in zip(weights.T, directions.transpose(2, 1, 0), strict=True):
         turned = np.cross(theta, d[:, :, None], axis=0)
-        mode_mode += _mode_mode(weight, turned)
+        mode_mode += _products_of_modes(weight, turned)
         position_mode += np.einsum("p,kp,lpj->klj", weight, d, turned)
     return Integrals(
         mass=float(m.sum()),
@@ -107,7 +107,7 @@ def _inertia_without_tilt(body: Slices) -> np.ndarray:
     return inertia
 
 
-def _mode_mode(weight: np.ndarray, s: np.ndarray) -> np.ndarray:
+def _products_of_modes(weight: np.ndarray, s: np.ndarray) -> np.ndarray:
     return np.einsum("kpi,lpj->klij", s * weight[:, None], s, optimize=True)
 
 

@@ -165,7 +165,7 @@ class SolidRecipe(BodyRecipe):
     """named frames and their nodes"""
 
     @model_validator(mode="after")
-    def _complete(self) -> SolidRecipe:
+    def _require_one_material(self) -> SolidRecipe:
         if (self.material is None) == (not self.materials):
             raise ValueError("give either `material` for the whole body or `materials` by region")
         return self
