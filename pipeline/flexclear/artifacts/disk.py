@@ -33,8 +33,6 @@ LARGEST_TABLE = 64 << 20
 PIECE = 1 << 17
 #: error numbers of a full or limited disk
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-#: age at which temporary files of other machines that share the disk, and unfinished work, are removed [s]
-ABANDONED_AFTER = 7 * 86400.0
 #: error numbers of a file system without locks
 LOCKLESS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 _TEMPORARY = re.compile(r"\.(?P<stem>[^.]*)\.(?P<host>[0-9a-f]{8})-(?P<pid>\d+)\.[0-9a-f]{8}\.tmp")
@@ -237,7 +235,9 @@ def _is_abandoned(path: Path) -> bool:
 
 def _is_old(path: Path) -> bool:
     with contextlib.suppress(OSError):
-        return time.time() - path.stat().st_mtime > ABANDONED_AFTER
+        # a week: age at which temporary files of other machines that share the disk, and unfinished work, are
+        # removed [s]
+        return time.time() - path.stat().st_mtime > 7 * 86400.0
     return False
 
 

@@ -15,8 +15,6 @@ from flexclear.system import platforms
 #: suffixes of files next to artifacts that belong to none
 NO_ARTIFACT = (".json", ".lock", ".part", ".tmp")
 DAY = 86400.0
-#: time for which a file of an artifact may lack its record [s]
-YOUNG = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,5 +146,6 @@ def _orphans(store: Store, known: set[Path]) -> Iterator[Path]:
     """Yield files of artifacts without a record, as of a process that died; young files may be about to get one."""
     for path in sorted((store.root / "cache").rglob("*")):
         ours = path.is_file() and path not in known and not path.name.endswith(NO_ARTIFACT)
-        if ours and time.time() - path.stat().st_mtime > YOUNG:
+        # 3600.0: time for which a file of an artifact may lack its record [s]
+        if ours and time.time() - path.stat().st_mtime > 3600.0:
             yield path

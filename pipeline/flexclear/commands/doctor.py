@@ -79,8 +79,6 @@ print(float(result.position.sel(body="ball", axis="z")[-1]))
 """
 #: templates with the kinds of parts that most mechanisms have
 USUAL = ("pendulum", "four-bar", "slider-crank", "leg")
-#: largest error [m]; the integration is exact to its tolerance of 1e-10
-CLOSE = 1e-9
 
 
 class UnwellError(FlexclearError):
@@ -211,7 +209,8 @@ def _self_test() -> tuple[str, bool]:
         # users need only the last line of a traceback
         last_lines = errors[-1:] if any(line.startswith("Traceback") for line in errors) else errors[-4:]
         return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
-    fine = abs(float(lines[-1]) - expected) < CLOSE
+    # 1e-9: largest error [m]; the integration is exact to its tolerance of 1e-10
+    fine = abs(float(lines[-1]) - expected) < 1e-9
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m instead of {expected:.12g} m", fine
 
 

@@ -28,8 +28,6 @@ MOST_POINTS = 2_000_000
 #: what a reader quotes of a file
 _QUOTED = re.compile(r"(['\"]).*?\1")
 _GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
-#: bytes of the header of a VTK file that are examined
-HEADER = 2000
 #: largest number of files that an Abaqus file may include, counted as often as they are read
 MOST_INCLUDES = 1000
 #: characters forbidden in names of DOLFIN files: meshio searches for their parts by a pattern that contains the name
@@ -99,7 +97,8 @@ def _require_mesh(path: Path, where: str, largest: int | None) -> None:
     machine.require_memory(COPIES * size, f"{where}: '{path.name}'", "use a coarser mesh")
     if path.suffix == ".vtk":
         with path.open("rb") as file:
-            match = _GRID.search(file.read(HEADER))
+            # 2000: bytes of the header of a VTK file that are examined
+            match = _GRID.search(file.read(2000))
         count = prod(int(number) for number in match[1].split()) if match is not None else 0
         if count > MOST_POINTS:
             raise InputError(where, f"'{path.name}' declares a grid of {count:.3g} points, more than {MOST_POINTS}")

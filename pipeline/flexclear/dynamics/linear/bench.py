@@ -30,9 +30,6 @@ from flexclear.system.progress import Progress
 
 Pose = TypeVar("Pose")
 
-#: drives reach the requested pose in steps of this fraction of the mechanism's size, or this angle
-STRIDE = 0.05
-
 
 @dataclass(frozen=True)
 class Bench:
@@ -179,7 +176,8 @@ def move_drives(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
         return close(bench, start)
 
     # smallest step, as a fraction of the whole way, before the pose counts as out of reach
-    return approach_in_steps(positions_at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, 1e-4)
+    # 0.05: drives reach the requested pose in steps of this fraction of the mechanism's size, or this angle
+    return approach_in_steps(positions_at, q, min(1.0, 0.05 / way) if way > 0.0 else 1.0, 1e-4)
 
 
 def approach_in_steps(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, shortest: float) -> Pose:

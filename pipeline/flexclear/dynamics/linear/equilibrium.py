@@ -52,8 +52,6 @@ LONGEST_MOVE = 0.2
 BALANCED, SHORT_MOVE = 1e-12, 1e-14
 #: relative unbalanced force that counts as rounding when iterations stop improving
 STALLED = 1e-8
-#: returns of unheld motions to where they began, which converge quadratically
-RETURNS = 4
 #: eigenvalues of the stiffness below this fraction of the largest count as zero
 NO_STIFFNESS = 1e-12
 #: corrections of one pose; each must be at most this fraction of the one before, else the step of the speed is halved
@@ -81,7 +79,8 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
     Motions that nothing holds there, such as that of a roller about its pin, end where they began.
     """
     rest = _follow_forces(bench, tangent(bench, q))
-    for _ in range(RETURNS):
+    # 4: returns of unheld motions to where they began, which converge quadratically
+    for _ in range(4):
         at = rest.at
         K, _ = stiffness(bench, at, at.Z)
         k, axes = np.linalg.eigh(0.5 * (K + K.T))

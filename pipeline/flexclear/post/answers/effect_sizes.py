@@ -25,8 +25,6 @@ UNKNOWN = Point({}, {}, {}, 0, "not run")
 FEW = 30.0
 #: labels of the chart's bars
 LEGEND = {"dropped": "removed", "added": "added alone", "early": "removed, up to the horizon"}
-#: the error bar goes back over at most this fraction of a bar, since the axis is logarithmic
-WHISKER = 0.9
 #: words for an infinite effect size, and their meaning
 NOT_COMPARABLE = "not comparable"
 MEANING_NOT_COMPARABLE = (
@@ -256,7 +254,8 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(rows, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
                 drawn = np.isfinite(shown) & (by_chance > 0.0)
-                ends = [np.minimum(by_chance, WHISKER * shown)[drawn], by_chance[drawn]]
+                # 0.9: the error bar goes back over at most this fraction of a bar, since the axis is logarithmic
+                ends = [np.minimum(by_chance, 0.9 * shown)[drawn], by_chance[drawn]]
                 panel.errorbar(
                     shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
                 )

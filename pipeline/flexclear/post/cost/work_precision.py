@@ -32,7 +32,6 @@ COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#0
 MARKS = ("o", "s", "D", "P", "v", "^", "X", "<", ">")
 #: one colour and mark per integrator, the same in every figure
 LOOKS = {name: (COLOURS[k % len(COLOURS)], MARKS[k % len(MARKS)]) for k, name in enumerate(INTEGRATORS)}
-COLUMNS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +62,7 @@ def make(
     drawn = curves(study)
     recorded = median_recording_time(study)
     with set_style():
-        figure, axes = panels(len(chosen), COLUMNS, 10.5, 1.1, 2.7)
+        figure, axes = panels(len(chosen), 3, 10.5, 1.1, 2.7)
         for k, ax in enumerate(axes):
             _panel(ax, chosen[k], k, (drawn, others), marks, MARGIN * float(study["reference_uncertainty"].values[k]))
             if np.isfinite(recorded):  # the cost of a run's record, which does not depend on the method

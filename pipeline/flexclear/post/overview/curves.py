@@ -65,8 +65,6 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
 
 
 NONE = np.empty((0, 2))
-#: a contact is short below so many output intervals
-SHORT = 4.0
 
 
 def _rotation_curve(run: xr.Dataset, quantity: Quantity) -> Curve:
@@ -123,7 +121,8 @@ def _peaks(run: xr.Dataset, contact: str) -> np.ndarray:
     """Return time and largest force of each contact so short that outputs may miss it."""
     mine = run["event_contact"].values == contact
     mine &= np.isfinite(run["event_peak_force"].values) & np.isfinite(run["event_duration"].values)
-    mine &= run["event_duration"].values < SHORT * float(np.median(np.diff(run["time"].values)))
+    # 4.0: a contact is short below so many output intervals
+    mine &= run["event_duration"].values < 4.0 * float(np.median(np.diff(run["time"].values)))
     middle = run["event_time"].values + 0.5 * run["event_duration"].values
     return np.column_stack([middle[mine], run["event_peak_force"].values[mine]])
 

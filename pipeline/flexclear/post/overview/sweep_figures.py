@@ -18,10 +18,7 @@ from flexclear.scene import units
 from flexclear.scene.load import FAMILIES
 from flexclear.scene.quantity import KINDS
 
-COLUMNS = 2
 LINE, REFUSED = "#0072B2", "#D55E00"
-#: largest number of values along the axis of a map that are all written
-FEW = 8
 #: factors for handy numbers on an axis
 HANDY = {"m": (1e3, "mm"), "N": (1.0, "N"), "s": (1e3, "ms")}
 NAME = "sweep"
@@ -38,7 +35,7 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
     shown = _panels(sweep, sections=draw is _curve)
     if draw is None or not shown or not (sweep["status"] == 0).any():
         return {}
-    columns = min(COLUMNS, len(shown))
+    columns = min(2, len(shown))
     with set_style():
         figure, axes = panels(len(shown), columns, 9.6, 1.0, 2.9 if columns > 1 else 4.2)
         for ax, name in zip(axes, shown, strict=True):
@@ -166,7 +163,8 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
         if _in_decades(values):
             scale("log")
             set_plain_numbers(axis)
-        if len(values) <= FEW:  # the cells' own values, which may be uneven
+        # 8: largest number of values along the axis of a map that are all written
+        if len(values) <= 8:  # the cells' own values, which may be uneven
             axis.set_ticks(values, labels=[f"{value:.6g}" for value in values])
             axis.set_ticks([], minor=True)
     _color_bar(figure, ax, mesh, _unit_text(sweep[name].attrs["units"]))

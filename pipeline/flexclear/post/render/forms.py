@@ -49,8 +49,6 @@ BALLS = ("spherical", *(name for name, kind in SURFACES.items() if kind.ideal ==
 LOADED, BARE = "load", "frame"
 #: two principal moments closer than this fraction are called equal: a cylinder, not a box; tables print four digits
 ROUND = 0.01
-#: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are visible
-THINNEST = 0.03
 #: largest file of a surface [bytes], since larger ones take too long to draw; and largest coordinate of its points [m]
 LARGEST_FILE, FARTHEST = 200_000_000, 1e15
 #: faces of cells, by their corners, seen from outside
@@ -103,7 +101,8 @@ def equivalent_solid(mass: float, inertia: np.ndarray) -> Solid:
 
 
 def _not_too_thin(half: np.ndarray) -> np.ndarray:
-    return np.maximum(half, THINNEST * half.max())
+    # 0.03: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are visible
+    return np.maximum(half, 0.03 * half.max())
 
 
 def _right_handed(axes: np.ndarray) -> np.ndarray:

@@ -42,8 +42,6 @@ COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9a
 BALL, RAIL = 0.022, 0.008
 #: radius of a drawn socket over that of its ball or pin: the clearance is drawn as if it were the difference
 SOCKET = 1.3
-#: size of a mechanism without extent: one body that rests [m]
-LONE = 1.0
 _CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
 #: largest drawn deformation as a fraction of the body's length
 DEFORMATION_SHARE = 0.05
@@ -116,7 +114,8 @@ def mechanism(
     )
     positions = run.frame_position.values if at.frames else run.position.values
     shown = np.concatenate([positions.reshape(-1, 3), *(drawn_points(run, body, 0)[0] for body in flexible)])
-    size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
+    # 1.0: size of a mechanism without extent: one body that rests [m]
+    size = float(np.linalg.norm(np.ptp(shown, axis=0))) or 1.0
     bodies = tuple(_bodies(at, looks, size))
     parts = (*bodies, *_joints(at, size), *loads(at, size, bodies))
     chosen_view = view(run, at.given, looks.direction, looks.up)

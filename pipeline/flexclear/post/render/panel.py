@@ -23,8 +23,6 @@ from flexclear.post.single_run.series import derive, parameters
 from flexclear.scene.loose_joints import SURFACES
 from flexclear.scene.quantity import Quantity
 
-#: largest angle of a body that does not turn [degrees]
-STILL = 1e-3
 #: margin next to titles [pixels]
 MARGIN = 6.0
 #: size of a picture of a joint [pixels], and length of its trail as a fraction of the run
@@ -162,7 +160,8 @@ def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> C
     """Draw the rotation of the body, or, without rotation, its displacement along the axis of its largest motion."""
     turned, moved = rotation_of_body(run, str(run.body.values[body])), post.displacement.values[:, body]
     angle = np.degrees(turned.angle)
-    if np.abs(angle).max() > STILL:
+    # 1e-3: largest angle of a body that does not turn [degrees]
+    if np.abs(angle).max() > 1e-3:
         axes.set_title(f"{run.body.values[body]}: {turned.title} (°)")
         return _curve(axes, run, angle, "#0072B2")
     axis = int(np.argmax(np.ptp(moved, axis=0)))

@@ -271,8 +271,6 @@ def _notes(drawn: mechanism.Mechanism, parameters: Mapping[str, Any], gaps: Sequ
 SIZE, MARGIN = (1600, 1000), 330
 #: heights of lines of names [pixels], with details below and without; begin and end of the columns
 LINES, TOP, BOTTOM = (33.0, 17.0), 70.0, 90.0
-#: pixels between a text and the picture's edge
-EDGE = 12
 
 
 def picture(start: StartView, title: str) -> np.ndarray:
@@ -327,7 +325,8 @@ def _columns(axes: style.Axes, marks: Sequence[Mark], points: np.ndarray) -> int
             align = "left" if right else "right"
             axes.plot([x + (-5 if right else 5), points[k, 0]], [y, points[k, 1]], color=mark.color, lw=0.7, alpha=0.6)
             axes.plot(*points[k], "o", ms=3.5, color=mark.color)
-            write = partial(_write, axes, MARGIN - 12 - EDGE, x, ha=align)
+            # 24: twelve pixels beside the mark, and twelve between a text and the picture's edge
+            write = partial(_write, axes, MARGIN - 24, x, ha=align)
             write(y, mark.text, fontsize=9.5, fontweight="bold", color=mark.color)
             if line == LINES[0]:
                 write(y + 14, mark.detail, fontsize=7.8, color=style.SOFT)

@@ -17,8 +17,6 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress
 
 WHERE = "mesh recipe [shape]"
-#: number of frequencies of the free body that are compared
-COMPARED = 10
 #: largest relative difference from a frequency or mass of a listing of the same model
 SAME = 0.01
 #: a listed frequency is one of a rigid motion below this fraction of the first elastic one
@@ -34,7 +32,8 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
         return {}, {}
     model = flexibility.model
     none = sp.csr_array((0, model.size))
-    count = min(COMPARED, model.size - 6)
+    # 10: number of frequencies of the free body that are compared
+    count = min(10, model.size - 6)
     free = normal.eigenvalues_to_hz(normal.lowest_modes(model, none, count, lambda: flexibility, progress).values)[
         :count
     ]

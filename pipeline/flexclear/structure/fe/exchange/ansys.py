@@ -14,10 +14,6 @@ import numpy as np
 from flexclear.system import machine
 from flexclear.system.errors import InputError
 
-#: longest time [s] for a file
-LONGEST = 300.0
-#: addresses [bytes] that the reader's libraries take before any file
-ADDRESSES = 4_000_000_000
 #: writes matrices, or numbers, positions and sets of nodes; held unknowns have the number `held`
 SCRIPT = """
 import sys
@@ -63,9 +59,11 @@ def arrays(path: Path, where: str) -> dict[str, np.ndarray]:
             SCRIPT,
             str(path.resolve()),
             str(target),
-            str(ADDRESSES + machine.available_memory()),
+            # 4_000_000_000: addresses [bytes] that the reader's libraries take before any file
+            str(4_000_000_000 + machine.available_memory()),
         ]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False)
+        # 300.0: longest time [s] for a file
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300.0, check=False)
         if not target.is_file():
             raise ValueError((done.stderr.strip().splitlines() or [f"its reader ended with {done.returncode}"])[-1])
         with np.load(target, allow_pickle=False) as data:
