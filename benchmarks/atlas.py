@@ -261,7 +261,7 @@ def _deviation(parameters: Parameters, described: Scene, run: xr.Dataset) -> flo
         return float("nan")
     velocity = parse("platform.velocity", described.owners())
     until = min(float(run["horizon"]), float(tight["horizon"]))
-    return quantities.error(run, tight, velocity, until) / quantities.scale(run, velocity)
+    return quantities.largest_distance(run, tight, velocity, until) / quantities.scale(run, velocity)
 
 
 def judge(run: xr.Dataset, deviation: float, seconds: float) -> Record:

@@ -18,7 +18,7 @@ from benchmarks.page import Columns, spread, table
 from benchmarks.processes import as_installed
 from benchmarks.timing import Times, interleaved, of_children
 from flexclear.artifacts.paths import PROJECT, results_root
-from flexclear.system.platforms import cores
+from flexclear.system.platforms import count_cores
 
 #: number of rounds; single ones take up to a quarter longer on a machine that others use as well
 ROUNDS = 11
@@ -78,7 +78,10 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
             )
             fractions = {name: parts.pop(name, 0.0) for name in SHOWN} if parts else {}
             wall = Times(tuple(waits[case.name][-ROUNDS:])).record("s")
-            yield case, [{"cpu": times[case.name].record("s"), "wall": wall, "processors": cores(), "parts": fractions}]
+            yield (
+                case,
+                [{"cpu": times[case.name].record("s"), "wall": wall, "processors": count_cores(), "parts": fractions}],
+            )
 
 
 def _timed(command: Command, folder: Path, fresh: Iterator[float], waits: list[float]) -> Callable[[], float]:

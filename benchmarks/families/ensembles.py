@@ -74,7 +74,7 @@ def _with_members(here: Mechanism, members: int) -> Callable[[], Any]:
 
 def _timed(work: Callable[[], Any], workers: int = 0, *, together: bool = True) -> tuple[float, float]:
     """Return wall and processor time of some work [s]."""
-    number = (lambda: workers) if workers else cores.cores
+    number = (lambda: workers) if workers else cores.count_cores
     few = ensemble.FEW if together else MEMBERS + 1
     with patch.object(cores, "cores", number), patch.object(ensemble, "FEW", few):
         begun, spent = time.perf_counter(), time.process_time()

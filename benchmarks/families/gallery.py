@@ -356,7 +356,7 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
     """Write the picture of a run, where this machine can draw."""
     from flexclear.post.render import gl
 
-    if not gl.works():
+    if not gl.can_draw():
         return
     from PIL import Image
 

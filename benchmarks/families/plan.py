@@ -128,7 +128,9 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
 def _requested(made: Drawn, full: Point, q: Quantity) -> float:
     """Return the requested accuracy of a quantity [SI]; a relative one refers to its size in the full scene."""
     request = made.record["wanted"][q.name]
-    return float(request["absolute"] if "absolute" in request else request["relative"] * effect_size.size(full, q))
+    return float(
+        request["absolute"] if "absolute" in request else request["relative"] * effect_size.reference_size(full, q)
+    )
 
 
 def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float]:

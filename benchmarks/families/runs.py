@@ -36,7 +36,7 @@ from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.trajectory import integrate
 from flexclear.post.plotting.table import pipe_table
 from flexclear.scene.schema import Scene
-from flexclear.system.platforms import cores
+from flexclear.system.platforms import count_cores
 from flexclear.system.progress import silent
 
 ROUNDS = 5
@@ -120,7 +120,7 @@ def _first_run(scene: str, folder: Path) -> Record:
         file.unlink()
     other = run(kernels)
     return {
-        "processors": cores(),
+        "processors": count_cores(),
         "wall_s": cold[0],
         "processor_s": cold[1],
         "warm_wall_s": warm[0],

@@ -13,7 +13,7 @@ from benchmarks import atlas
 from benchmarks.atlas import ALONG, CLOSURE, DEVIATION, LEDGER, RANGES, Parameters
 from benchmarks.family import FINISHED, REFUSED, WRONG, Family, Record
 from benchmarks.page import png
-from flexclear.post.plotting.style import SOFT, plt, style
+from flexclear.post.plotting.style import SOFT, plt, set_style
 from flexclear.post.plotting.table import pipe_table
 from flexclear.scene.integrators import DEFAULT, INTEGRATORS
 
@@ -136,7 +136,7 @@ SHADES = (
 def files(records: Sequence[Record]) -> dict[str, bytes]:
     """Return all figures, by path below docs/."""
     random = [r for r in records if r["sweep"] == "random"]
-    with style():
+    with set_style():
         return {
             "stability/sweeps.png": _sweeps(records, "evaluations", "evaluations"),
             "stability/ledger.png": _sweeps(records, "ledger", "energy error", limit=LEDGER),

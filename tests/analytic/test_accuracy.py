@@ -32,7 +32,7 @@ def test_the_delivered_error_is_the_requested_one(reference, requested):
     run = dynamics.simulate(scene, {}, quiet)
     velocity = parse("platform.velocity", scene.owners())
     size = quantities.scale(reference, velocity)
-    delivered = quantities.error(run, reference, velocity) / size
+    delivered = quantities.largest_distance(run, reference, velocity) / size
     assert run.attrs["accuracy_verdict"] == "met"
     # a run is accepted whose estimate is at most that; estimates are good to some per cent, and at 1e-9 the
     # reference's own rounding, 4e-10 m/s, is as large as what is compared
@@ -41,7 +41,7 @@ def test_the_delivered_error_is_the_requested_one(reference, requested):
     # its energy is refused
     with suppress(SolverError):
         looser = simulated(load_scene(CSJ, {"solver.rtol": 10.0 * run.attrs["accuracy_rtol"]}))
-        assert quantities.error(looser, reference, velocity) / size > requested
+        assert quantities.largest_distance(looser, reference, velocity) / size > requested
 
 
 def test_several_quantities_are_met_together(reference):
@@ -50,7 +50,7 @@ def test_several_quantities_are_met_together(reference):
     run = dynamics.simulate(scene, {}, quiet)
     for name, limit in (("A1.impact_times", 1e-6), ("platform.position", 1e-7)):
         quantity = parse(name, scene.owners())
-        assert quantities.error(run, reference, quantity) < 3.0 * limit
+        assert quantities.largest_distance(run, reference, quantity) < 3.0 * limit
     assert float(json.loads(run.attrs["accuracy_estimated"])["A1.impact_times"]) <= 1e-6
 
 
@@ -60,7 +60,7 @@ def test_what_cannot_be_had_is_said_with_the_best_there_is(reference):
     run = dynamics.simulate(scene, {}, quiet)
     assert "times the requested accuracy" in run.attrs["accuracy_verdict"]
     velocity = parse("platform.velocity", scene.owners())
-    assert quantities.error(run, reference, velocity) < 1e-8 * quantities.scale(reference, velocity)
+    assert quantities.largest_distance(run, reference, velocity) < 1e-8 * quantities.scale(reference, velocity)
 
 
 @pytest.mark.slow

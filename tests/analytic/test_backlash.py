@@ -13,7 +13,7 @@ from flexclear.post.answers.effect_sizes import IDEAL
 from flexclear.scene.ends import Gear
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import effects, ideal
+from flexclear.scene.variants import effects, ideal_scene
 from flexclear.study import compare
 from flexclear.study.effects import removals
 from flexclear.system.errors import InputError
@@ -163,9 +163,9 @@ def test_a_stop_of_two_coordinates_is_a_buffer_between_their_bodies() -> None:
 def test_the_play_of_teeth_is_an_effect_that_the_ideal_mechanism_lacks() -> None:
     loose = Scene.model_validate(wheels({"stiffness": STIFFNESS}, (1.0, 0.0)))
     assert [(one.name, one.kind) for one in effects(loose)] == [("gear.mesh.backlash", "backlash")]
-    assert ideal(loose).gear["mesh"] == Gear(first="w0", second="w1", ratio=RATIO)
+    assert ideal_scene(loose).gear["mesh"] == Gear(first="w0", second="w1", ratio=RATIO)
     assert loose.stop_ends() == ["mesh.lower", "mesh.upper"]
-    assert ideal(loose).stop_ends() == []
+    assert ideal_scene(loose).stop_ends() == []
     assert [one.name for one in compare.ideal_scenes(loose, "clearance")] == [f"{loose.name} without clearance"]
     # nothing else is ideal there, so that it is listed as that effect
     together, alone = (removals(loose, effects(loose), IDEAL)[name] for name in (IDEAL, "gear.mesh.backlash"))

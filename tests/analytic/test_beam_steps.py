@@ -130,7 +130,7 @@ def test_closed_forms_miss_no_frequency(held: tuple[str, str], ends: str) -> Non
     rotary = (2.0 * RHO * second, RHO * second, RHO * second)
     rod = Piece(length, E * area, 2.0 * G * second, (E * second,) * 2, RHO * area, rotary, (shear, shear))
     bending = np.repeat(closed_form.bending_frequencies(span, ends, 8), 2)
-    waves = [closed_form.rod(math.sqrt(modulus / RHO), length, ends, 8) for modulus in (E, G)]
+    waves = [closed_form.rod_frequencies(math.sqrt(modulus / RHO), length, ends, 8) for modulus in (E, G)]
     expected = np.sort(np.concatenate([bending, *waves]))[:16]
     assert expected[-1] > math.sqrt(shear / (RHO * second)) / (2.0 * math.pi)
     np.testing.assert_allclose(exact_frequencies([rod], [], held, 16, parts=8), expected, rtol=1e-8)

@@ -184,7 +184,7 @@ def test_twist_and_extension_converge_at_twice_their_degree(
     ends: str, motion: tuple[int, ...], name: str, degree: str, elements: list[int], expected: float
 ) -> None:
     speed = math.sqrt((G if name == "torsion" else E) / RHO)
-    exact = closed_form.rod(speed, L, words(ends), 2)
+    exact = closed_form.rod_frequencies(speed, L, words(ends), 2)
     error = np.array(
         [frequencies(build(elements=n, **{name: degree}), motion, ends, 2) / exact - 1.0 for n in elements]
     )
@@ -195,7 +195,7 @@ def test_twist_and_extension_converge_at_twice_their_degree(
 @pytest.mark.parametrize("motion, name", [(TORSION, "torsion"), (EXTENSION, "extension")])
 def test_resolution_of_the_first_twist_and_extension(motion: tuple[int, ...], name: str) -> None:
     """65 linear elements per half wave, or 6 quadratic ones: (pi/64)^2 / 24 is 0.01004 %, just too much."""
-    exact = closed_form.rod(math.sqrt((G if name == "torsion" else E) / RHO), L, "fixed-fixed", 1)
+    exact = closed_form.rod_frequencies(math.sqrt((G if name == "torsion" else E) / RHO), L, "fixed-fixed", 1)
     for degree, enough, short in (("linear", 65, 64), ("quadratic", 6, 5)):
         good, bad = (
             float(frequencies(build(elements=n, **{name: degree}), motion, "CC", 1)[0] / exact[0] - 1.0)
@@ -240,7 +240,7 @@ def test_held_ends_have_their_exact_frequencies(reference: str, interfaces: tupl
     rod = build(**FINE, theory=theory)
     families = LOWEST[reference]
     found = solve(rod, reference, len(families), interfaces)["frequency"].values
-    expected = closed_form.columns(rod, reference, families, interfaces)[THEORIES[theory]]
+    expected = closed_form.exact_frequencies(rod, reference, families, interfaces)[THEORIES[theory]]
     # the third pair of bending with 24 elements: 3e-5
     np.testing.assert_allclose(found, expected, rtol=1e-4)
 
@@ -248,8 +248,8 @@ def test_held_ends_have_their_exact_frequencies(reference: str, interfaces: tupl
 def test_an_interface_inside_the_rod_has_no_closed_form() -> None:
     rod = build(frames={"bottom": {"x": 0.0}, "inside": {"x": 0.06}, "top": {"x": 0.24}})
     for reference in ("cantilever", "pinned-pinned"):
-        assert closed_form.columns(rod, reference, ["bending_y"], ("inside", "top")) == {}
-    assert closed_form.columns(rod, "craig-bampton", ["bending_y"], ("bottom", "top")) == {}
+        assert closed_form.exact_frequencies(rod, reference, ["bending_y"], ("inside", "top")) == {}
+    assert closed_form.exact_frequencies(rod, "craig-bampton", ["bending_y"], ("bottom", "top")) == {}
 
 
 @pytest.mark.parametrize(
@@ -262,11 +262,11 @@ def test_an_interface_inside_the_rod_has_no_closed_form() -> None:
     ids=["mass", "taper", "skew"],
 )
 def test_other_rods_have_none(changes: dict[str, Any]) -> None:
-    assert closed_form.columns(build(**changes), "free-free", ["bending_y"]) == {}
+    assert closed_form.exact_frequencies(build(**changes), "free-free", ["bending_y"]) == {}
 
 
 def test_a_section_without_kappa_has_no_timoshenko_column() -> None:
-    columns = closed_form.columns(build(section=GENERAL), "free-free", ["bending_y"])
+    columns = closed_form.exact_frequencies(build(section=GENERAL), "free-free", ["bending_y"])
     assert set(columns) == {"exact_euler_bernoulli", "exact_rayleigh"}
 
 

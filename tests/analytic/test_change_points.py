@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from flexclear import dynamics
-from flexclear.dynamics.record.dataset import recorded
+from flexclear.dynamics.record.dataset import record_run
 from flexclear.dynamics.run.progress_rate import Judge, Judges
 from flexclear.dynamics.run.run import RunInParts, integrate
 from flexclear.scene.load import load_scene
@@ -119,7 +119,7 @@ def test_passes_stay_recorded_when_another_method_takes_over() -> None:
     assert run.model.scene.solver.integrator == "radau"
     # the pose is where closures depend on each other, which is known to the square root of what they are open
     assert [one.time for one in run.trajectory.passes] == pytest.approx([first, first + 0.5 * np.pi], abs=1e-6)
-    found = recorded(run).to_xarray()
+    found = record_run(run).to_xarray()
     assert four_bar_error(found, 1.5 + 4.0 * found.time.values, 1.0, cp.FOUR_BAR) < 1e-8  # a hundred times rtol
 
 

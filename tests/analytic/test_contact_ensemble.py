@@ -78,7 +78,7 @@ def test_a_contact_that_is_closed_at_the_end_counts_until_then() -> None:
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_members_are_the_same_to_the_last_bit_whoever_makes_them(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
-    monkeypatch.setattr(cores, "cores", lambda: threads)
+    monkeypatch.setattr(cores, "count_cores", lambda: threads)
     assert analyses.ensemble(scene(), {}, silent).identical(members())
 
 
@@ -87,7 +87,7 @@ def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once
     monkeypatch: pytest.MonkeyPatch, lanes: int
 ) -> None:
     """Also with fewer lanes than members, and with fewer members than lanes; that lanes are used is looked at."""
-    monkeypatch.setattr(cores, "cores", lambda: 1)
+    monkeypatch.setattr(cores, "count_cores", lambda: 1)
     monkeypatch.setattr(ensemble, "LANES", (lanes,))
     known, made = six(), listened(monkeypatch)
     assert analyses.ensemble(scene(members=6), {}, silent).identical(known)
@@ -111,7 +111,7 @@ def six() -> xr.Dataset:
     """Six members, each of which takes its own steps."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ensemble, "FEW", 7)
-        patch.setattr(cores, "cores", lambda: 1)
+        patch.setattr(cores, "count_cores", lambda: 1)
         return analyses.ensemble(scene(members=6), {}, silent)
 
 
@@ -121,7 +121,7 @@ def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bi
     """Four members at once, and one after the other: impacts, sticking, rejected steps, loops that are closed."""
     asked = {"members": 4, "perturbation": "1 um"}
     paper = load_scene(TREE / "scenes/sps4/csj.toml", override={"ensemble": asked, "time.end": "60 ms"})
-    monkeypatch.setattr(cores, "cores", lambda: 1)
+    monkeypatch.setattr(cores, "count_cores", lambda: 1)
     made = listened(monkeypatch)
     together = analyses.ensemble(paper, {}, silent)
     assert [bool(group._places.any()) for group in made] == ([] if INTERPRETED else [True])  # several at once
@@ -133,7 +133,7 @@ def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bi
 
 def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """The others end at their next pause; nobody waits for ever."""
-    monkeypatch.setattr(cores, "cores", lambda: 1)
+    monkeypatch.setattr(cores, "count_cores", lambda: 1)
     proper, begun, threads = trajectory._begin_closed, itertools.count(), threading.active_count()
 
     def fails(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
@@ -148,7 +148,7 @@ def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyP
 
 
 def test_of_concurrent_members_the_first_that_fails_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cores, "cores", lambda: 2)
+    monkeypatch.setattr(cores, "count_cores", lambda: 2)
     ended = []
 
     def work(k: int, alive: Progress) -> None:

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from benchmarks.rigid_impacts import rigid_heights
 from flexclear.dynamics.contact.surfaces.ball_on_strip import separation
-from flexclear.dynamics.linear.clearance_response import bounds
+from flexclear.dynamics.linear.clearance_response import bound_effects
 from flexclear.dynamics.model.mechanism import build
 from flexclear.dynamics.run.run import integrate
 from flexclear.dynamics.sensitivity.dataset import sensitivities
@@ -19,7 +19,7 @@ from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import effects, ideal
+from flexclear.scene.variants import effects, ideal_scene
 from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, impacts
@@ -301,7 +301,7 @@ def test_a_slider_beside_its_guide_touches_nothing() -> None:
 def test_the_ideal_counterpart_is_a_prismatic_joint_along_the_same_axis() -> None:
     loose = Scene.model_validate(sliding([0.0, 0.0, 2.0]))
     assert [effect.name for effect in effects(loose)] == ["joint.guide.clearance"]
-    tight = ideal(loose)
+    tight = ideal_scene(loose)
     assert tight.joint["guide"].type == "prismatic"
     dataset = simulated(tight)
     assert dataset.position.sel(body="body").values[:, 2] == pytest.approx(2.0 * dataset.time.values, abs=1e-12)
@@ -387,9 +387,9 @@ def test_a_slider_tilts_no_farther_than_the_bound_of_its_clearance_says() -> Non
     loose = Scene.model_validate(
         sliding([0.3, 0.0, 1.0], [0.0, 5.0, 0.0], end=0.02, normal=LINEAR | {"stiffness": 1e9})
     )
-    tight = ideal(Scene.model_validate(sliding([0.0, 0.0, 1.0])))
+    tight = ideal_scene(Scene.model_validate(sliding([0.0, 0.0, 1.0])))
     chosen = [parse("body.orientation", loose.owners())]
-    bound = bounds(loose, integrate(tight, {}, silent), chosen)["guide"]
+    bound = bound_effects(loose, integrate(tight, {}, silent), chosen)["guide"]
     assert bound["body.orientation"] == pytest.approx(2.0 * GAP / LENGTH, rel=1e-6)
     dataset = simulated(loose)
     deep = float(dataset.contact_penetration.max())

@@ -13,7 +13,7 @@ from flexclear.post.single_run.series import PIECES, derive, spread_over_surface
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.scene.start import Start
-from flexclear.scene.variants import contacts_that_stay, ideal
+from flexclear.scene.variants import contacts_that_stay, ideal_scene
 from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, impacts, run
 from tests.properties.mechanisms import Table, frame, joint, rigid, scene, simulate, simulated
@@ -102,13 +102,13 @@ def test_a_plane_has_no_ideal_joint_in_its_place() -> None:
     """It is reported, and not replaced by something else."""
     whole = load_scene(TREE / "scenes" / f"{PLANE}.toml")
     with pytest.raises(InputError, match="that can be removed"):
-        ideal(whole)
+        ideal_scene(whole)
     assert contacts_that_stay({name: one.type for name, one in whole.joint.items()}) == list(whole.contacts())
 
 
 def test_a_yoke_without_clearance_follows_the_cosine() -> None:
     """Its pin slides in the slot by the sine; a pin in a fixed slot flies along it, and turns with its body."""
-    tight = ideal(load_scene(TREE / "scenes" / f"{YOKE}.toml"))
+    tight = ideal_scene(load_scene(TREE / "scenes" / f"{YOKE}.toml"))
     assert {name: one.type for name, one in tight.joint.items() if "slot" in name} == {"slot": "slot"}
     turning = tight.body["free"].model_copy(update={"angular_velocity": (0.0, 0.0, 3.0)})
     dataset = simulated(tight.model_copy(update={"body": tight.body | {"free": turning}}))
@@ -169,7 +169,7 @@ def test_a_loose_slot_moves_the_ram_of_a_quick_return_off_its_ideal_kinematics()
     loose = {"type": "clearance-slot", "clearance": clearance, "travel": 0.2, "pin_radius": 0.012, "length": 0.02}
     loose |= {"slot_material": steel, "pin_material": steel, "normal": {"law": "flores", "restitution": 0.5}}
     whole = shaper(**loose).model_copy(update={"start": Start.model_validate(STARTED | {"at": "ideal"})})
-    tight = simulated(ideal(whole.model_copy(update={"start": Start.model_validate(STARTED)})))
+    tight = simulated(ideal_scene(whole.model_copy(update={"start": Start.model_validate(STARTED)})))
     t = tight.time.values
     # prescribed motion through a loop: its closure
     assert tight.position.sel(body="ram").values[:, 0] == pytest.approx(ram(t), abs=1e-9)

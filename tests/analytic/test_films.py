@@ -20,7 +20,7 @@ from flexclear.scene.films import actions_of, films_of
 from flexclear.scene.load import edited
 from flexclear.scene.quantity import parse
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import effects, ideal
+from flexclear.scene.variants import effects, ideal_scene
 from flexclear.system.progress import silent
 from tests.properties.mechanisms import Table, matrix, rigid, scene, simulate
 
@@ -362,7 +362,7 @@ def test_a_film_that_cannot_be_is_refused_in_words(case: str) -> None:
 def test_a_film_is_an_effect_of_its_own_and_goes_with_the_clearance() -> None:
     made = Scene.model_validate(oiled())
     assert {effect.name for effect in effects(made)} == {"joint.A.clearance", "joint.A.film"}
-    assert not films_of(ideal(made))
+    assert not films_of(ideal_scene(made))
     assert parse("A.film_thickness", made.owners()).terms()[0].kind == "film_thickness"
     dry = edited(made, {"joint.A.film": None})
     assert not actions_of(dry)

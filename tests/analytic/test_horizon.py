@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from flexclear import dynamics
-from flexclear.artifacts.quantities import PERTURBATION, SEPARATED, indices_of_lasting, separated_from
+from flexclear.artifacts.quantities import PERTURBATION, SEPARATED, index_of_separation, indices_of_lasting
 from flexclear.dynamics import analyses
 from flexclear.dynamics.run.evaluation.observation import frames
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.run import engine_of, observe_run
 from flexclear.dynamics.run.trajectory import integrate
-from flexclear.post.single_run.series import horizon
+from flexclear.post.single_run.series import separation_time
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
@@ -111,7 +111,7 @@ def test_bodies_that_only_turn_about_fixed_points_are_compared_as_well():
     """Frames of links lie on pins there, whose velocities are zero or prescribed; an ensemble diverges all the same."""
     loose = dynamics.simulate(four_bar(), {}, silent)
     members = analyses.ensemble(four_bar(ensemble={"members": 4}), {}, silent)
-    diverged = horizon(members.time.values, members.velocity.values)
+    diverged = separation_time(members.time.values, members.velocity.values)
     assert float(loose.horizon) < 0.5
     # two draws of an exponential growth from 4 and 10 nm: the same impact or one of the next
     assert 0.5 < diverged / float(loose.horizon) < 2.0
@@ -180,7 +180,7 @@ CLOSE, VISIBLE, FAR = 5e-4, 1e-2, 5e-2
     ],
 )
 def test_the_horizon_is_where_runs_are_separated_from_then_on(separation: list[float], first: int | None):
-    assert separated_from(np.arange(72.0), np.array(separation), 71.0) == first
+    assert index_of_separation(np.arange(72.0), np.array(separation), 71.0) == first
 
 
 def test_damped_motion_that_forgets_its_impacts_is_believed_to_the_end():

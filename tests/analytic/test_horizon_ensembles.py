@@ -13,7 +13,7 @@ from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.horizon.exponent import Growth, growth, start_direction
 from flexclear.dynamics.run.horizon.tangents import differentiate
 from flexclear.dynamics.run.run import engine_of
-from flexclear.post.single_run.series import horizon
+from flexclear.post.single_run.series import separation_time
 from flexclear.scene.load import load_scene
 from flexclear.scene.schema import Scene
 from flexclear.system.progress import silent
@@ -60,7 +60,7 @@ def horizons(seed: int) -> tuple[float, float]:
     alone = dynamics.simulate(Scene.model_validate(table), {}, silent)
     requested = {"members": MEMBERS, "perturbation": PERTURBATION * CLEARANCE}
     members = analyses.ensemble(Scene.model_validate(table | {"ensemble": requested}), {}, silent)
-    return float(alone.horizon), horizon(members.time.values, members.velocity.values)
+    return float(alone.horizon), separation_time(members.time.values, members.velocity.values)
 
 
 def agreeing(seeds: Sequence[int]) -> tuple[int, int]:

@@ -11,7 +11,7 @@ import xarray as xr
 from flexclear import dynamics, load_scene
 from flexclear.artifacts import quantities
 from flexclear.artifacts.effect_size import compared_values as recorded_quantities
-from flexclear.artifacts.labelled import LabelledArrays, of
+from flexclear.artifacts.labelled import LabelledArrays, label_dataset
 from flexclear.dynamics import analyses
 from flexclear.dynamics.effects import schemes
 from flexclear.dynamics.record.point import Runner
@@ -64,7 +64,7 @@ def test_ringing_modes_get_the_method_that_follows_them() -> None:
     assert "the modes' fastest vibration" in run.attrs["method_reason"]
     assert run.attrs["method_reason"] in reported
     velocity = parse("platform.velocity", scene.owners())
-    error = quantities.error(run, reference(), velocity) / quantities.scale(reference(), velocity)
+    error = quantities.largest_distance(run, reference(), velocity) / quantities.scale(reference(), velocity)
     assert run.attrs["accuracy_verdict"] == "met"
     assert error < 3e-3  # what is requested, and the estimate's own doubt, as in test_accuracy
     # an explicit method is stable with 140 evaluations per millisecond; here some 25 are taken
@@ -98,7 +98,7 @@ def test_where_that_is_dear_it_is_as_exact_as_a_thousandth_of_each_range() -> No
     assert run.attrs["evaluations"] < 0.5 * reference().attrs["evaluations"]
     for name in ("platform.position", "platform.velocity"):
         quantity = parse(name, scene.owners())
-        error = quantities.error(run, reference(), quantity) / quantities.scale(reference(), quantity)
+        error = quantities.largest_distance(run, reference(), quantity) / quantities.scale(reference(), quantity)
         assert error < 3e-3  # the default request, and the estimate's own doubt, as above
 
 
@@ -297,11 +297,11 @@ class InParts:
 
     def until(self, time: float) -> LabelledArrays:
         self.asked.append(time)
-        return of(self.run.sel(time=self.run["time"] <= time).drop_vars("horizon", errors="ignore"))
+        return label_dataset(self.run.sel(time=self.run["time"] <= time).drop_vars("horizon", errors="ignore"))
 
     def whole(self) -> LabelledArrays:
         self.asked.append(np.inf)
-        return of(self.run)
+        return label_dataset(self.run)
 
 
 def refused_below(least: float, run: xr.Dataset) -> xr.Dataset:

@@ -13,7 +13,7 @@ import xarray as xr
 from flexclear.artifacts import compliance
 from flexclear.structure.fe.model import Model
 from flexclear.structure.fe.recipe import read_recipe
-from flexclear.structure.fe.statics import Flexibility, support
+from flexclear.structure.fe.statics import Flexibility, factorise_supported
 from flexclear.structure.kinds import kind
 from flexclear.structure.kinds.kind import of_mesh
 from flexclear.structure.modes import bundle, deficits, normal
@@ -45,7 +45,7 @@ def rod() -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def body(rod: xr.Dataset) -> Flexibility:
-    return support(of_mesh(rod).assemble(rod), lambda fraction: None)
+    return factorise_supported(of_mesh(rod).assemble(rod), lambda fraction: None)
 
 
 @pytest.mark.parametrize("condition", COMPLETE)
@@ -56,7 +56,7 @@ def test_complete_sets_span_the_same_space(rod: xr.Dataset, body: Flexibility, c
     assert vectors.shape == (78, 72)
     together = np.hstack([model.rigid, vectors])
     assert np.linalg.matrix_rank(together / np.linalg.norm(together, axis=0)) == 78
-    fraction = deficits.of_basis(body, model.interfaces, vectors) / deficits.full(body, model.interfaces)
+    fraction = deficits.of_basis(body, model.interfaces, vectors) / deficits.full_compliance(body, model.interfaces)
     # the eigenvalues of the basis span 1e9; what is left of rounding in a static answer is about its root
     np.testing.assert_allclose(fraction, 1.0, rtol=0.0, atol=1e-7)
     values, _ = normal.rediagonalise(model.stiffness, model.mass, body.remove_momentum(vectors))
@@ -77,7 +77,7 @@ def test_mean_axes_take_all_momentum_out_of_any_basis(rod: xr.Dataset, body: Fle
 
 def test_attachment_modes_have_the_free_rods_answer_to_an_end_load(rod: xr.Dataset, body: Flexibility) -> None:
     """A force on the end of a free rod, balanced by its inertia, moves that end by F L / 3 E A from the mean."""
-    whole = deficits.full(body, body.model.interfaces)
+    whole = deficits.full_compliance(body, body.model.interfaces)
     axial = whole[3, 3, 2]  # frame `top` against nothing, z of the frame runs along the rod
     # 12 linear elements: constant strain where the true one is linear loses 1 / 4 n^2 of the energy
     assert axial == pytest.approx(L / (3.0 * E * A) * (1.0 - 0.25 / 144), rel=1e-9)
@@ -106,9 +106,9 @@ def test_dense_and_sparse_solvers_agree_on_held_functionals(
     from flexclear.system.progress import silent
 
     held = rows(body.model)
-    dense = normal.lowest(body.model, held, 8, lambda: body, silent)
+    dense = normal.lowest_modes(body.model, held, 8, lambda: body, silent)
     monkeypatch.setattr(normal, "DENSE_LIMIT", 10)
-    sparse = normal.lowest(body.model, held, 8, lambda: body, silent)
+    sparse = normal.lowest_modes(body.model, held, 8, lambda: body, silent)
     # eigenvalues span 1.2e6: the lowest is known to eps times that, 2.6e-10; ten times that
     np.testing.assert_allclose(sparse.values, dense.values, rtol=3e-9)
     for found in (dense, sparse):
@@ -150,7 +150,7 @@ def test_a_mechanism_is_distinguished_from_a_body(body: Flexibility) -> None:
     cut = sp.diags_array(middle.astype(float)) @ body.model.stiffness @ sp.diags_array(middle.astype(float))
     rest = sp.diags_array((~middle).astype(float)) @ body.model.stiffness @ sp.diags_array((~middle).astype(float))
     with pytest.raises(InputError, match="than its six rigid ones"):
-        support(
+        factorise_supported(
             replace(body.model, stiffness=sp.csr_array(_free(cut, body, middle) + _free(rest, body, ~middle))), _quiet
         )
 
@@ -251,7 +251,7 @@ def test_the_error_of_a_harmonic_load_stays_below_its_bound(
     first = data.attrs["first_free_frequency"]
     vectors = data["vector"].values
     hertz = first * np.array([0.1, 0.5, 0.9])
-    bounds = deficits.bounds(body, vectors, hertz, first)
+    bounds = deficits.error_bounds(body, vectors, hertz, first)
     basis = np.hstack([body.model.rigid, vectors])
     for k, frame in enumerate(body.model.interfaces):
         # frame axes x y z are mesh axes y z x

@@ -99,7 +99,7 @@ def test_a_scene_knows_before_it_runs_what_its_run_holds_and_in_which_unit(name:
     for text in names_in(run(name)):
         quantity = parse(text, asked)
         assert quantity.unit == quantities.unit(run(name), quantity), text
-        assert quantity == Quantity.read(quantity.written())
+        assert quantity == Quantity.from_json(quantity.to_json())
 
 
 @pytest.mark.parametrize("name", [*RUNS, "driven", FLEXIBLE])
@@ -112,14 +112,14 @@ def test_every_quantity_of_a_run_can_be_evaluated_compared_and_drawn(name: str) 
         assert np.isfinite(values.values).all()
         if quantity.over_time:
             assert values.dims == (("time", quantity.dim) if quantity.dim else ("time",))
-        assert quantities.error(data, data, quantity) == 0.0
+        assert quantities.largest_distance(data, data, quantity) == 0.0
         assert quantities.scale(data, quantity) >= 0.0
         assert curves([data], quantity)[0] is not None
     compared = comparison.assemble({"a": data, "b": data}, {}, chosen)
     assert compared.sizes["quantity"] == len(chosen)
     # what a study stores of a run is enough to compare it
-    stored = quantities.keep(data, chosen)
-    assert all(quantities.error(stored, data, quantity) == 0.0 for quantity in chosen)
+    stored = quantities.select_variables(data, chosen)
+    assert all(quantities.largest_distance(stored, data, quantity) == 0.0 for quantity in chosen)
 
 
 @pytest.mark.parametrize("name", [*RUNS, "driven"])
@@ -148,7 +148,7 @@ def test_a_sweep_keeps_of_every_quantity_what_the_run_holds(name: str) -> None:
             )
         else:
             # an impact multiplies rounding; not by more than some thousand in so few
-            assert point.values[one.name] == pytest.approx(quantities.events(data, one.quantity)[0], rel=1e-9)
+            assert point.values[one.name] == pytest.approx(quantities.contact_values(data, one.quantity)[0], rel=1e-9)
     assert {one.name: np.shape(point.values[one.name])[1:] for one in kept if one.quantity.dim == ""} == {
         one.name: () for one in kept if one.quantity.dim == ""
     }

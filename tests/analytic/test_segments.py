@@ -175,7 +175,7 @@ def test_names_edits_and_effects_are_those_of_one_rod(path: Path) -> None:
     assert scene.joint["rod_cut_2"].between == ("rod_2.cut_2", "rod_3.cut_2")
     assert parse("rod.middle.position.z", scene.owners()).owner == "rod_2.middle"
     assert [effect.name for effect in variants.effects(scene)] == ["body.rod.modes"]
-    rigid = variants.without(scene, variants.effects(scene))
+    rigid = variants.without_effects(scene, variants.effects(scene))
     assert [body.type for body in rigid.body.values()] == ["ground"] + ["rigid"] * 4
     assert len(edited(scene, {"body.rod.segments": 3}).flexible()) == 3
     assert edited(scene, {"time.end": 0.02}).rods() == {"rod": ["rod_1", "rod_2", "rod_3", "rod_4"]}

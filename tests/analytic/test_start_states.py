@@ -140,7 +140,7 @@ def test_a_beam_held_at_an_angle_sags_and_is_let_go_from_there() -> None:
 
 def test_what_rounding_leaves_of_a_state_is_zero_in_the_scene_that_begins_there() -> None:
     """Scenes take no number below 1e-50: a modal rate of 5e-79 comes of rounding alone."""
-    assert snapshot.writable(np.array([5e-79, -3e-60, 1e-20, -2.0])) == [0.0, 0.0, 1e-20, -2.0]
+    assert snapshot.round_for_scene(np.array([5e-79, -3e-60, 1e-20, -2.0])) == [0.0, 0.0, 1e-20, -2.0]
 
 
 # On a stop, at rest ---------------------------------------------------------------------------------------------------
@@ -248,7 +248,7 @@ def test_pins_are_pressed_into_their_places_without_bending_a_rod_or_being_held_
     begun, choice = ideal.begin(scene, bundles(scene), lambda fraction, text: None)
     assert "assembled in 2 ways" in choice
     assert begun.start is not None
-    engine, y = ideal._start_ideal(ideal.placed(scene), bundles(scene), lambda fraction, text: None)
+    engine, y = ideal._start_ideal(ideal.with_placing_joints(scene), bundles(scene), lambda fraction, text: None)
     loaded = ideal._deform_statically(engine, y)
     # pressing bends the rod by rounding of its length
     assert begun.start.modal["rod"].coordinate == pytest.approx(loaded[ideal._modes(engine)], abs=1e-12)
@@ -267,7 +267,7 @@ def test_flexible_bodies_begin_an_ideal_start_as_its_loads_hold_them() -> None:
     """Their modes do not accelerate then, so that no first peak of a force is that of springing into their shape."""
     template = TREE / "pipeline" / "flexclear" / "stages" / "templates" / "slider_crank" / "slider_crank.toml"
     scene = edited(load_scene(template), {"start": {"at": "ideal"}})
-    engine, y = ideal._start_ideal(ideal.placed(scene), bundles(scene), lambda fraction, text: None)
+    engine, y = ideal._start_ideal(ideal.with_placing_joints(scene), bundles(scene), lambda fraction, text: None)
     speeds = ideal._modal_speeds(engine)
     straight = ideal._accelerations(engine, y, speeds)
     loaded = ideal._deform_statically(engine, y)
@@ -292,7 +292,7 @@ def test_pressing_pins_into_their_places_leaves_exact_joint_positions_as_they_ar
     assert crank.angular_velocity == pytest.approx([0.0, 0.0, 2.0], rel=0, abs=1e-12)
     assert begun.drive == {}
     # with the rocker given as well, the coupler alone cannot bring its pin to the wall
-    engine, y = ideal._start_ideal(ideal.placed(scene), bundles(scene), lambda fraction, text: None)
+    engine, y = ideal._start_ideal(ideal.with_placing_joints(scene), bundles(scene), lambda fraction, text: None)
     rocker = joint_coordinates(engine.model, observe(engine, rows_of(engine, y[None], engine.start)))["D"][0][0]
     both = edited(scene, {"start.joint.D": {"position": f"{rocker} rad"}})
     begun, choice = ideal.begin(both, bundles(both), lambda fraction, text: None)

@@ -81,10 +81,10 @@ def test_a_table_and_its_slope_are_continuous_and_lines_bend_at_points(tables: d
     for between in ("cubic", "linear"):
         given = LookupTable.model_validate(tables["damper"] | {"between": between})
         numbers = np.array(lookups.numbers(given))
-        assert len(numbers) == lookups.length(given.levels())
+        assert len(numbers) == lookups.length(given.halvings())
         table = symbols.Indexed(numbers.__getitem__)
         at = [0.3, 0.3 - 1e-12, 0.3 + 1e-12, 1.9999, -2.0, 2.0]
-        found = [lookups.curve(table, *given.levels(), dual.Dual(x, np.ones(1))) for x in at]
+        found = [lookups.curve(table, *given.halvings(), dual.Dual(x, np.ones(1))) for x in at]
         value, slope = np.array([one.value for one in found]), np.array([one.change[0] for one in found])
         np.testing.assert_allclose(value[1:3], value[0], rtol=0.0, atol=1e-10)
         if between == "cubic":
@@ -94,7 +94,7 @@ def test_a_table_and_its_slope_are_continuous_and_lines_bend_at_points(tables: d
             steps = np.diff(DAMPER * np.tanh([0.2, 0.3, 0.4])) / 0.1
             np.testing.assert_allclose(slope[[1, 2]], steps, rtol=1e-11)
         with np.errstate(invalid="ignore"):
-            assert all(np.isnan(lookups.curve(table, *given.levels(), x)) for x in (2.001, -2.001))
+            assert all(np.isnan(lookups.curve(table, *given.halvings(), x)) for x in (2.001, -2.001))
 
 
 def test_a_run_ends_where_it_leaves_a_table_and_says_so(tables: dict[str, Table]) -> None:

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from flexclear.dynamics.record.dataset import recorded
+from flexclear.dynamics.record.dataset import record_run
 from flexclear.dynamics.run.evaluation import closure_rows
 from flexclear.dynamics.run.run import integrate
 from flexclear.numerics.rotations import quaternion_to_matrix
@@ -193,7 +193,7 @@ def test_the_motion_does_not_depend_on_which_rows_are_solved_for(monkeypatch: py
     often = integrate(scene, {}, lambda fraction, text: None)
     changes = [[time for time, _ in run.trajectory.selections] for run in (once, often)]
     assert changes[0] != changes[1]
-    same_motion(recorded(often).to_xarray(), recorded(once).to_xarray(), 1e-9)
+    same_motion(record_run(often).to_xarray(), record_run(once).to_xarray(), 1e-9)
 
 
 def test_rows_are_chosen_anew_before_the_present_ones_depend_on_each_other(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from benchmarks.hard_scenes import ACROSS, ALONG, ARM, MASS, MIXED, SIDE, SLOPE, deflection, rotor
 from flexclear.commands.__main__ import main
-from flexclear.commands.frequencies import speeds
+from flexclear.commands.frequencies import parse_speeds
 from flexclear.dynamics import analyses
 from flexclear.dynamics.linear.campbell import campbell
 from flexclear.numerics.rotations import rotation_vector_to_matrix
@@ -215,11 +215,11 @@ def test_a_jeffcott_rotor_whirls_at_one_frequency_at_all_speeds() -> None:
 
 
 def test_speeds_are_first_last_and_step_in_one_unit() -> None:
-    assert speeds("0:500rpm:50") == pytest.approx(np.arange(0.0, 501.0, 50.0) * np.pi / 30.0)
-    assert speeds("10:30:10") == pytest.approx([10.0, 20.0, 30.0])
+    assert parse_speeds("0:500rpm:50") == pytest.approx(np.arange(0.0, 501.0, 50.0) * np.pi / 30.0)
+    assert parse_speeds("10:30:10") == pytest.approx([10.0, 20.0, 30.0])
     for wrong in ("500", "0:500rpm", "0:500kg:50", "0:500:-50", "500:0:50", "0:1e9:1"):
         with pytest.raises(InputError, match="--speeds"):
-            speeds(wrong)
+            parse_speeds(wrong)
 
 
 def test_the_command_prints_a_table_and_writes_dataset_and_picture(

@@ -142,9 +142,9 @@ def test_a_console_of_an_old_code_page_shows_what_it_can(root: Path, tmp_path: P
 
 def test_a_running_process_is_alive_and_one_that_ended_is_not() -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
-        assert platforms.alive(process.pid)
+        assert platforms.is_alive(process.pid)
         process.communicate(b"\n")
-    assert not platforms.alive(process.pid)
+    assert not platforms.is_alive(process.pid)
 
 
 @pytest.fixture

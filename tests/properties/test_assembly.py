@@ -75,7 +75,7 @@ def test_where_a_free_coordinate_starts_is_reported_unless_the_scene_says_it() -
     assert hanging(swing={"position": 0.3}).choice == ""
     assert hanging(swing={"position": 0.0}).choice == ""
     whole = mechanism.scene
-    sought = equilibrium.placed(
+    sought = equilibrium.with_placing_joints(
         whole.model_copy(update={"start": whole.start.model_copy(update={"at": "equilibrium"})})
     )
     assert assemble(build(sought, {})).choice == ""

@@ -13,11 +13,11 @@ import xarray as xr
 from flexclear.structure.fe import beam
 from flexclear.structure.fe.model import Model
 from flexclear.structure.fe.recipe import read_recipe
-from flexclear.structure.fe.statics import Flexibility, support
+from flexclear.structure.fe.statics import Flexibility, factorise_supported
 from flexclear.structure.kinds import kind
 from flexclear.structure.kinds.kind import of_mesh
 from flexclear.structure.modes import normal, reference
-from flexclear.structure.modes.reference import Condition, check
+from flexclear.structure.modes.reference import Condition, require_definite_condition
 from flexclear.structure.modes.solution import solve
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import silent
@@ -168,19 +168,19 @@ def test_a_missed_mode_is_noticed(held: bool) -> None:
     """Sylvester's count sees a frequency that an eigensolver left out, of a held as of a free body."""
     model = of_mesh(rod()).assemble(rod())
     rows = model.interfaces[0].motion if held else sp.csr_array((0, model.size))
-    values = normal.lowest(model, rows, 8, support_of(model), silent).values
-    normal._nothing_missed(model, rows, *gap(values))
+    values = normal.lowest_modes(model, rows, 8, support_of(model), silent).values
+    normal._require_complete_spectrum(model, rows, *gap(values))
     fewer = np.delete(values, 2)
     with pytest.raises(SolverError, match="the eigensolver found"):
-        normal._nothing_missed(model, rows, *gap(fewer))
+        normal._require_complete_spectrum(model, rows, *gap(fewer))
 
 
 def support_of(model: Model) -> Callable[[], Flexibility]:
-    return lambda: support(model, lambda fraction: None)
+    return lambda: factorise_supported(model, lambda fraction: None)
 
 
 def gap(values: np.ndarray) -> tuple[int, float]:
-    found = normal.gap(values)
+    found = normal.count_below_gap(values)
     assert found is not None
     return found
 
@@ -224,10 +224,10 @@ def test_held_motions_are_independent_down_to_rounding(angle: float, independent
     rows = np.eye(6)
     rows[1] = np.cos(angle) * rows[0] + np.sin(angle) * rows[1]
     if independent:
-        check(*held_by(*rows.tolist()))
+        require_definite_condition(*held_by(*rows.tolist()))
         return
     with pytest.raises(InputError, match="not independent of each other"):
-        check(*held_by(*rows.tolist()))
+        require_definite_condition(*held_by(*rows.tolist()))
 
 
 @pytest.mark.parametrize("lever, left", [(1e-6, 0), (1e-12, 1)])
@@ -236,7 +236,7 @@ def test_a_short_lever_holds_a_rotation_down_to_rounding(lever: float, left: int
     model, condition = held_by(*np.eye(6).tolist())
     model.rigid = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, lever])
     if not left:
-        check(model, condition)
+        require_definite_condition(model, condition)
         return
     with pytest.raises(InputError, match=f"leave {left} rigid-body motions"):
-        check(model, condition)
+        require_definite_condition(model, condition)

@@ -176,8 +176,8 @@ def test_contacts_beyond_the_horizon_do_not_count():
         one["contact_impulse"] = (("time", "contact"), grown[:, None])
     for kind in ("peak_force", "impulse"):
         quantity = Quantity("pin", kind)
-        assert quantities.error(a, b, quantity) == 30.0
-        assert quantities.error(a, b, quantity, until=0.45) == 0.0
+        assert quantities.largest_distance(a, b, quantity) == 30.0
+        assert quantities.largest_distance(a, b, quantity, until=0.45) == 0.0
 
 
 def test_the_answer_has_the_time_and_the_error_up_to_the_horizon():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexclear.artifacts.labelled import of
+from flexclear.artifacts.labelled import label_dataset
 from flexclear.dynamics.model.assembly import assemble, residuals
 from flexclear.dynamics.model.constraints import constraints
 from flexclear.dynamics.model.mechanism import build
@@ -75,7 +75,7 @@ def test_frames_of_flexible_bodies_fit_too(miss: float) -> None:
     scene = load_scene(TREE / "scenes/checks/flexible_slider_crank.toml")
     changes = {f"body.{name}.pose": None for name in ("crank", "rod", "slider")}
     posed = edited(scene, changes | {"start": {"joint": {"guide": {"near": 0.45}}}})
-    bundle = of(bundles(scene)["rod"])
+    bundle = label_dataset(bundles(scene)["rod"])
     array = bundle["frame_position"]
     bent = replace(array, values=array.values + miss * np.array([[0.0, 0.0, 1.0], [0.0] * 3, [0.0] * 3]))
     off = {"rod": replace(bundle, variables={**bundle.variables, "frame_position": bent})}

@@ -13,7 +13,7 @@ from flexclear.scene.schema import Scene
 from flexclear.scene.toml_files import read_toml
 from flexclear.structure.fe import beam as beams
 from flexclear.structure.fe.section import POINTS
-from flexclear.structure.fe.slices import fields_at_points, motion
+from flexclear.structure.fe.slices import fields_at_points, section_motion
 from flexclear.structure.kinds import kind
 from flexclear.structure.modes import bundle
 from flexclear.structure.modes.solution import solve
@@ -55,7 +55,7 @@ def second_order(reduced: Reduced, q: np.ndarray, x0: float, steps: int) -> tupl
     s = (np.arange(steps) + 0.5) / steps
     carry = np.vander(s, 5) @ np.linalg.inv(np.vander(POINTS, 5))
     shape = (*beam.basis.dx.shape, 6)
-    at_points = [(part @ vector).reshape(shape) for part in (motion(beam), fields_at_points(beam, strains))]
+    at_points = [(part @ vector).reshape(shape) for part in (section_motion(beam), fields_at_points(beam, strains))]
     section, strain = (np.einsum("sp,cpk->csk", carry, part).reshape(-1, 6) for part in at_points)
     x = np.linspace(0.0, 1.0, len(section), endpoint=False) + 0.5 / len(section)
     theta, curvature = section[:, 3:], strain[:, 3:]

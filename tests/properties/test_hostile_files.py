@@ -273,7 +273,7 @@ def test_what_is_pruned_lies_in_the_cache(tmp_path: Path) -> None:
     for stage in ("../stage", "stage/../..", "/stage", ""):
         altered(record, stage=stage, files={"txt": sha256(b"content")})
         assert read_record(record) is None
-    for artifact in maintenance.prunable(store, maintenance.inventory(store, whole=True), -1.0):
+    for artifact in maintenance.list_prunable(store, maintenance.inventory(store, whole=True), -1.0):
         maintenance.remove(store, artifact)
     assert (tmp_path / "precious.txt").read_text() == "precious"
 
@@ -348,7 +348,7 @@ def test_a_grid_with_a_missing_pair_is_refused_and_a_file_with_a_byte_order_mark
     rows = [f"{x},{y},1" for x in range(3) for y in range(2)]
     given = {"file": str(path), "of": columns, "value": {"column": "z", "unit": "N"}}
     path.write_text("\n".join(["x,y,z", *rows]), encoding="utf-8-sig")
-    assert LookupTable.model_validate(given).levels() == (1, 0)
+    assert LookupTable.model_validate(given).halvings() == (1, 0)
     for text in (rows[:-1], [*rows[:-1], rows[0]]):
         path.write_text("\n".join(["x,y,z", *text]))
         with pytest.raises(ValidationError, match=r"rows for 3 x 2 values of 'x' and 'y'; give every pair one row"):

@@ -23,7 +23,7 @@ from flexclear.dynamics.contact.normal.expression import rebound, resolve
 from flexclear.dynamics.vectors import ZERO, Vector
 from flexclear.scene.clearance import Friction, NormalLaw
 from flexclear.scene.expression import FUNCTIONS, JUMPING, OPERANDS, Local
-from flexclear.scene.law_expressions import encoded
+from flexclear.scene.law_expressions import encode_law
 from flexclear.scene.load import load_scene
 from flexclear.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE
@@ -200,7 +200,7 @@ def test_every_operation_of_the_language_is_composed() -> None:
     assert known == set(OPERATIONS)
     assert set(FUNCTIONS) - set(JUMPING) <= known
     text = "a*sqrt(a)+min(a,b)-max(a,b)/abs(-b)+sin(a)*cos(b)+tan(a)*exp(-b)+log(b)*tanh(a)+norm(b)+a^2.5+b^-3+a^n+a^12"
-    kind, values = encoded(text, {"n": 1.7}, {"a": Local("x0", "1"), "b": Local("x1", "1")})
+    kind, values = encode_law(text, {"n": 1.7}, {"a": Local("x0", "1"), "b": Local("x1", "1")})
     x, y = 0.7, 1.9
     known = {name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")}
     known |= {"min": min, "max": max, "abs": abs, "norm": abs, "a": x, "b": y, "n": 1.7}

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from flexclear.artifacts.effect_size import POOLED, Agreement, agreement, compared_values, same_starts
-from flexclear.artifacts.points import Point, batch
+from flexclear.artifacts.points import Point, dataset_of_batch
 from flexclear.commands.new import write
 from flexclear.dynamics.plan import search
 from flexclear.post.answers.effect_sizes import staying_contacts_sentence
@@ -160,7 +160,7 @@ def test_a_refused_variant_is_repeated_once_at_a_tenth_of_the_scenes_tolerance(a
             point = Point({} if refused else values, {}, {}, 1, refused)
             recorded = compared_values(scene.owners(), scene.watched_quantities())
             spent = {"members": 4, "compile_seconds": 0.0, "cpu_seconds": 4.0}
-            return batch({"point": point}, recorded).assign_attrs(spent)
+            return dataset_of_batch({"point": point}, recorded).assign_attrs(spent)
 
     account = Budget(1e3)
     own = Setting("dop853", 1e-8), 1.0

@@ -28,13 +28,13 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import silent
 from tests.paper import synthetic
 
-needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
+needs_gl = pytest.mark.skipif(gl.library_state().endswith("none"), reason=gl.REMEDY)
 #: points are kept in single precision by files and pages
 SINGLE = 1e-6
 
 
 def seat(place: list[float], joint: str, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Seat:
-    return Seat(f"b.{place}", np.array(place), surfaces.along(np.array(axis)), joint, True)
+    return Seat(f"b.{place}", np.array(place), surfaces.axes_along(np.array(axis)), joint, True)
 
 
 def spans(surface: surfaces.Surface) -> np.ndarray:
@@ -160,7 +160,7 @@ def test_a_missing_shape_file_is_refused_with_its_key():
 
 def test_a_film_is_slow_around_the_strongest_impact_and_even_without():
     run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
-    strong = film_speed.strongest(run)
+    strong = film_speed.strongest_impacts(run)
     assert strong.size
     shown = film_speed.frame_times(run, seconds=4.0, slower=10.0)
     slowest = shown.times[np.argmax(shown.slower)]

@@ -7,7 +7,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import flexclear as fc
 from flexclear.post.overview import sweep_figures
-from flexclear.post.overview.curves import NOISE, format_to_digits, impacts, noise, without_noise
+from flexclear.post.overview.curves import NOISE, format_to_digits, impacts_text, rounding_range, without_noise
 from flexclear.post.plotting import style
 from flexclear.post.render import start_view
 from flexclear.post.render.layout import CLEARANCE_COLOR
@@ -63,11 +63,11 @@ def test_long_names_of_a_start_end_before_the_edge(letter: str):
 
 
 def test_a_zero_line_has_no_range_of_its_own():
-    with style.style():
+    with style.set_style():
         figure, ((zero, small),) = style.grid(1, 2, (4.0, 2.0))
         for axes, size in ((zero, 0.0), (small, 1e-9)):
             axes.plot([0.0, 1.0], [0.0, size])
-            style.flatten(axes)
+            style.mark_only_zero(axes)
         assert list(zero.get_yticks()) == [0.0]
         assert max(small.get_ylim()) == pytest.approx(1e-9, rel=0.2)
         style.files("x", figure)
@@ -77,7 +77,7 @@ def test_both_files_of_a_figure_have_the_layout_that_was_solved_once(monkeypatch
     """To solve it takes as long as to draw both."""
     solved, solve = [], ConstrainedLayoutEngine.execute
     monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda self, fig: solved.append(solve(self, fig)))
-    with style.style():
+    with style.set_style():
         figure, _ = style.grid(1, 2, (4.0, 2.0))
         assert set(style.files("x", figure)) == {"x.png", "x.svg"}
     assert len(solved) == 1
@@ -129,10 +129,12 @@ def test_rounding_is_judged_by_the_whole_motion_where_all_curves_of_a_kind_are_r
     )
     change = np.array([0.0, 1.0])
     for unit, rounding, motion in (("m", 1e-15, 1e-9), ("m/s", 1e-14, 1e-9), ("N", 1e-13, 1e-9), ("N m", 1e-12, 1e-6)):
-        assert not without_noise(rounding * change, noise(run, rounding * change, unit)).any()
-        assert np.array_equal(without_noise(motion * change, noise(run, motion * change, unit)), motion * change)
+        assert not without_noise(rounding * change, rounding_range(run, rounding * change, unit)).any()
+        assert np.array_equal(
+            without_noise(motion * change, rounding_range(run, motion * change, unit)), motion * change
+        )
     without_frames = run.isel(frame=slice(0))
-    assert noise(without_frames, change, "m") == noise(without_frames, change, "rad") > 0.0
+    assert rounding_range(without_frames, change, "m") == rounding_range(without_frames, change, "rad") > 0.0
 
 
 @pytest.mark.parametrize(
@@ -145,7 +147,7 @@ def test_rounding_is_judged_by_the_whole_motion_where_all_curves_of_a_kind_are_r
     ],
 )
 def test_a_contact_that_hardly_opens_is_called_so(count: int, closed: float, said: str):
-    words = impacts(count, closed)
+    words = impacts_text(count, closed)
     assert words.startswith(said)
     assert ("most of the time" in words) == (closed > 0.9)
 

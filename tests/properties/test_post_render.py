@@ -24,7 +24,7 @@ from flexclear.post.single_run.series import derive
 from flexclear.system.errors import SolverError
 from tests.paper import synthetic
 
-needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
+needs_gl = pytest.mark.skipif(gl.library_state().endswith("none"), reason=gl.REMEDY)
 
 
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1 / 3, 2 / 3, 2 / 3)], ids=["upright", "turned"])
@@ -229,11 +229,11 @@ def test_a_stepped_rod_is_drawn_with_each_cells_radius():
 
 
 def test_state_of_gl_is_said_without_drawing():
-    assert gl.state().startswith("GL")
+    assert gl.library_state().startswith("GL")
 
 
 def test_without_gl_there_is_no_film_but_an_error_that_says_why(monkeypatch):
-    monkeypatch.setattr("flexclear.post.render.gl.works", lambda: False)
+    monkeypatch.setattr("flexclear.post.render.gl.can_draw", lambda: False)
     shown = Shown(run=synthetic.run("sps4/far_cb", modes=7), bundles={"rod1": synthetic.bundle()})
     with pytest.raises(SolverError, match="libgl1"):
         make("motion", "mp4", shown)

@@ -15,7 +15,7 @@ from flexclear.numerics.rotations import (
     rotation_since_start,
     rotation_vector_to_quaternion,
 )
-from flexclear.post.single_run.series import derive, horizon, spread
+from flexclear.post.single_run.series import derive, member_spread, separation_time
 from flexclear.scene.quantity import Quantity
 from papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation, velocity_at_events
 from papers.wang_wang_2019.figures.phase import at_times
@@ -155,22 +155,22 @@ def test_runs_without_common_times_are_refused():
 def test_horizon_is_where_members_part(run: xr.Dataset):
     found = synthetic.ensemble(run, growth=60.0)
     time, velocity = found.time.values, found.velocity.values
-    end = horizon(time, velocity)
+    end = separation_time(time, velocity)
     peak = np.linalg.norm(velocity, axis=-1).max()
     at = int(np.searchsorted(time, end - 1e-12))
-    assert spread(velocity)[at] > 1e-3 * peak
-    assert (spread(velocity)[:at] <= 1e-3 * peak).all()
+    assert member_spread(velocity)[at] > 1e-3 * peak
+    assert (member_spread(velocity)[:at] <= 1e-3 * peak).all()
 
 
 def test_members_are_as_far_apart_as_the_body_in_which_they_differ_most():
     velocity = np.zeros((2, 1, 3, 3))  # two members, one time, three bodies: apart by 0, 2 and 10 m/s
     velocity[:, 0, 1, 0], velocity[:, 0, 2, 1:] = [-1.0, 1.0], [[-3.0, -4.0], [3.0, 4.0]]
-    assert spread(velocity) == pytest.approx([5.0])
+    assert member_spread(velocity) == pytest.approx([5.0])
 
 
 def test_horizon_of_members_that_stay_together_is_the_end(run: xr.Dataset):
     members = synthetic.ensemble(run, growth=0.0)
-    assert horizon(members.time.values, members.velocity.values) == run.time.values[-1]
+    assert separation_time(members.time.values, members.velocity.values) == run.time.values[-1]
 
 
 def test_faster_growth_shortens_the_horizon(run: xr.Dataset):
@@ -230,7 +230,7 @@ def test_slow_closings_are_no_impacts(run: xr.Dataset, slow: float, impacts: int
     run = run.assign(event_approach_speed=("event", speed))
     expected = synthetic.BURSTS.size - 1 + impacts
     assert derive(run).sizes["impact"] == expected
-    assert quantities.events(run, Quantity("A1", "impact_times")).size == expected
+    assert quantities.contact_values(run, Quantity("A1", "impact_times")).size == expected
 
 
 def test_an_impact_that_has_not_ended_is_counted_and_listed_without_its_end(run: xr.Dataset):

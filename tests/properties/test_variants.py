@@ -41,7 +41,7 @@ def test_friction_of_ideal_joints_is_an_effect_of_its_own(crank: Path):
     scene = edited(load_scene(crank), {"joint.main.friction": {**law, "radius": 0.01}})
     found = {effect.name: effect for effect in variants.effects(scene)}
     assert found["joint.main.friction"].within == ""
-    assert variants.without(scene, [found["joint.main.friction"]]).joint["main"].friction is None
+    assert variants.without_effects(scene, [found["joint.main.friction"]]).joint["main"].friction is None
 
 
 def with_parts(crank: Path) -> Scene:
@@ -86,7 +86,9 @@ def test_a_part_that_goes_takes_its_quantities_with_it(crank: Path):
     scene = edited(
         with_parts(crank), {"view": {"watch": ["spring.force", "bush.bushing_displacement", "slider.position"]}}
     )
-    gone = variants.without(scene, variants.effects_of(scene, ["load.spring", "load.bush", "joint.floor"], "of"))
+    gone = variants.without_effects(
+        scene, variants.effects_of(scene, ["load.spring", "load.bush", "joint.floor"], "of")
+    )
     assert set(gone.load) == {"gravity", "brake"}
     assert "floor" not in gone.joint
     assert (gone.joint["bush"].type, gone.joint["bush"].between) == ("revolute", ("ground.main", "crank.main"))
@@ -121,7 +123,7 @@ def test_any_watched_quantity_leaves_every_variant(crank: Path):
     watched = {name: edited(scene, {"view": {"watch": [name]}}) for name in names if variants._has_part(name, owners)}
     assert len({key for name in watched for key in [name.rpartition(".")[2]]}) > 40
     for one in watched.values():
-        variants.ideal(one)
+        variants.ideal_scene(one)
         for setting in (Setting("dop853", 1e-7), Setting("rk4", 1e-7, 1e-4)):
             neighbours(one, setting)
 
@@ -130,18 +132,18 @@ def test_modes_of_a_body_that_becomes_rigid_are_asked_for_no_more(crank: Path):
     watched = ["rod.1.modal_coordinate", "pin.peak_force", "slider.position"]
     scene = edited(load_scene(crank), {"view": {"watch": watched}})
     gone = [effect for effect in variants.effects(scene) if effect.name == "body.rod.modes"]
-    assert variants.without(scene, gone).view.watch == tuple(watched[1:])
-    assert variants.ideal(scene).view.watch == ("slider.position",)
+    assert variants.without_effects(scene, gone).view.watch == tuple(watched[1:])
+    assert variants.ideal_scene(scene).view.watch == ("slider.position",)
 
 
 def test_any_variant_is_a_file_that_extends_its_scene_by_parts_replaced_and_removed(crank: Path):
     scene = load_scene(crank)
     every = variants.effects(scene)
     for gone in (few for n in range(len(every) + 1) for few in combinations(every, n)):
-        variant = variants.without(scene, gone)
+        variant = variants.without_effects(scene, gone)
         target = crank.parent / "below" / "variant.toml"
         target.parent.mkdir(exist_ok=True)
-        text = variants.text(scene, variant, variants.relative(target, crank))
+        text = variants.variant_text(scene, variant, variants.relative_path(target, crank))
         target.write_text(text)
         assert load_scene(target).model_dump(mode="json") == variant.model_dump(mode="json")
         families = set(tomllib.loads(text)) & {"body", "joint", "load", "drive"}
@@ -151,10 +153,10 @@ def test_any_variant_is_a_file_that_extends_its_scene_by_parts_replaced_and_remo
 def test_what_lies_within_an_effect_goes_with_it(crank: Path):
     scene = load_scene(crank)
     by_name = {effect.name: effect for effect in variants.effects(scene)}
-    rigid = variants.without(scene, [by_name["body.rod.modes"]])
+    rigid = variants.without_effects(scene, [by_name["body.rod.modes"]])
     assert "body.rod.damping" not in {effect.name for effect in variants.effects(rigid)}
     assert rigid.output.stress is None
-    tight = variants.without(scene, [by_name["joint.pin.clearance"], by_name["joint.pin.friction"]])
+    tight = variants.without_effects(scene, [by_name["joint.pin.clearance"], by_name["joint.pin.friction"]])
     assert tight.joint["pin"].type == "revolute"
     assert tight.view is not None
     assert "pin.peak_force" not in (tight.view.watch or ())

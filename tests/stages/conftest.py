@@ -237,7 +237,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
 @pytest.fixture
 def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work is done in this process: to start others takes longer than most of what is tested."""
-    monkeypatch.setattr(cores, "cores", lambda: 1)
+    monkeypatch.setattr(cores, "count_cores", lambda: 1)
 
 
 @pytest.fixture
@@ -293,5 +293,5 @@ def shared_results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FLEXCLEAR_RESULTS", str(tmp_path_factory.mktemp("results")))
-        patch.setattr(cores, "cores", lambda: 1)
+        patch.setattr(cores, "count_cores", lambda: 1)
         yield

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import xarray as xr
 
 from flexclear.commands.new import write
-from flexclear.dynamics.linear.clearance_response import bounds
+from flexclear.dynamics.linear.clearance_response import bound_effects
 from flexclear.dynamics.linear.response import Response, response
 from flexclear.dynamics.run.run import Run, integrate
 from flexclear.scene import variants
@@ -36,7 +36,7 @@ class Pilot(NamedTuple):
     inputs: dict[str, xr.Dataset]
 
     def bounds(self, *chosen: Quantity) -> Mapping[str, Mapping[str, float]]:
-        return bounds(self.scene, self.ideal, chosen)
+        return bound_effects(self.scene, self.ideal, chosen)
 
     def response(self, *chosen: Quantity) -> Response:
         """Of the flexible bodies."""
@@ -48,7 +48,7 @@ def pilot(scene: Scene) -> Pilot:
     outcome = place.bring(list(task.inputs.values()), 1)
     inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
     dropped = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
-    bare = variant_runs.plain(variants.without(scene, dropped))
+    bare = variant_runs.plain(variants.without_effects(scene, dropped))
     rigid = {name: inputs[name] for name in Graph(bare, shown=False).bodies()}
     return Pilot(scene, integrate(simulation.rebuild(simulation.params(bare), rigid), {}, silent), inputs)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.commands.__main__ import parser
+from flexclear.commands.__main__ import build_parser
 from flexclear.stages.graph import STAGES
 from tests.stages.conftest import JOINT, SCENE, Command
 
@@ -67,7 +67,7 @@ def test_usage_mistakes_end_with_2(command: Command, arguments: list[str]):
 def test_help_names_every_stage(command: Command):
     said = command("run", "--help").out
     assert all(stage in said for stage in STAGES)
-    assert parser([]).prog == "flexclear"
+    assert build_parser([]).prog == "flexclear"
 
 
 def test_cite_names_methods_that_are_used_and_no_others(command: Command):

@@ -14,7 +14,7 @@ from flexclear.post.overview import comparison, curves, figures
 from flexclear.scene.load import edited, load_scene
 from flexclear.scene.parts import MeshedRigidBody
 from flexclear.scene.quantity import Quantity
-from flexclear.scene.variants import ideal
+from flexclear.scene.variants import ideal_scene
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import open_workplace
@@ -65,14 +65,14 @@ def test_no_modes_make_a_rigid_body_and_so_does_the_recipe_alone(crank: Path):
 
 def test_a_twin_differs_in_the_effect_alone(crank: Path):
     scene = load_scene(crank)
-    without = ideal(scene, ("clearance",))
+    without = ideal_scene(scene, ("clearance",))
     assert without.joint["pin"].type == "revolute"
     assert without.joint["pin"].between == scene.joint["pin"].between
     assert without.body == scene.body
-    stiff = ideal(scene, ("flexibility",))
+    stiff = ideal_scene(scene, ("flexibility",))
     assert stiff.joint == scene.joint
     assert stiff.body["rod"].pose == scene.body["rod"].pose
-    both = ideal(scene)
+    both = ideal_scene(scene)
     assert not both.contacts()
     assert not both.flexible()
     assert {q.name for q in both.watched_quantities()} == {"slider.position", "slider.velocity", "motor.drive_force"}
@@ -82,7 +82,7 @@ def test_a_twin_differs_in_the_effect_alone(crank: Path):
 def test_what_is_ideal_has_no_twin(tmp_path: Path):
     scene = load_scene(write("pendulum", tmp_path)[0])
     with pytest.raises(InputError, match="that can be removed"):
-        ideal(scene)
+        ideal_scene(scene)
     with pytest.raises(InputError, match="a single scene has no other to compare with"):
         compare.compare_scenes([scene], open_workplace())
 

@@ -55,7 +55,7 @@ def files(tmp_path: Path) -> list[Path]:
 @pytest.fixture(autouse=True)
 def _two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever machine this is."""
-    monkeypatch.setattr(cores, "cores", lambda: 2)
+    monkeypatch.setattr(cores, "count_cores", lambda: 2)
     monkeypatch.setattr(cores, "_others_idle", None)
 
 

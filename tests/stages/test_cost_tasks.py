@@ -95,7 +95,7 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
         other = scenes.run(edited(swing, {"solver": {"integrator": "dop853", "rtol": float(rtol)}}), place)
         for name in map(str, found["quantity"].values):
             q = parse(name, swing.owners())
-            error = quantities.error(other, converged, q) / max(quantities.scale(converged, q), 1e-300)
+            error = quantities.largest_distance(other, converged, q) / max(quantities.scale(converged, q), 1e-300)
             here = errors.sel(quantity=name)
             unsure = float(found.reference_uncertainty.sel(quantity=name))
             if float(here) > 20.0 * unsure:  # of errors near the reference's own nothing is claimed
@@ -224,7 +224,7 @@ def test_the_first_answer_comes_soon_and_its_errors_are_those_of_a_converged_run
         if not q.over_time:
             continue
         reported = float(study["own_error"].sel(quantity=q.name))
-        true = quantities.error(mine, reference, q, until) / (quantities.scale(reference, q) or 1.0)
+        true = quantities.largest_distance(mine, reference, q, until) / (quantities.scale(reference, q) or 1.0)
         print(f"{kind} {q.name}: error {reported:.2e}, by {other['integrator']} {true:.2e}")
         assert reported <= FACTOR * true + ROUNDING
         assert true <= FACTOR * reported + ROUNDING

@@ -73,7 +73,7 @@ def crank(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setenv("FLEXCLEAR_RESULTS", str(folder / "results"))
-        patch.setattr(cores, "cores", lambda: 1)  # other processes take seconds to start
+        patch.setattr(cores, "count_cores", lambda: 1)  # other processes take seconds to start
         scene, _ = write("slider-crank", folder)
         scene.write_text(scene.read_text().replace('end = "0.13 s"', 'end = "25 ms"'))
         assert main(["run", "-q", str(scene)]) == 0

@@ -30,8 +30,8 @@ def test_graphics_are_well_only_where_something_was_drawn(
 ):
     """Libraries that load may fail when they draw; they are not needed, so that the machine is well without them."""
     monkeypatch.setattr(doctor, "_self_test", lambda: ("it fell", True))
-    monkeypatch.setattr(gl, "works", lambda: draws)
-    monkeypatch.setattr(gl, "state", lambda: "GL: libGL.so.1")
+    monkeypatch.setattr(gl, "can_draw", lambda: draws)
+    monkeypatch.setattr(gl, "library_state", lambda: "GL: libGL.so.1")
     assert line in command("doctor").out
 
 

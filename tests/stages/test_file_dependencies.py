@@ -18,7 +18,7 @@ from flexclear.stages.graph import Graph
 from flexclear.structure.fe.exchange import files
 from flexclear.structure.kinds.kind import of_mesh
 from flexclear.system.errors import InputError, ResourceError
-from flexclear.system.external_files import companions, read_mesh
+from flexclear.system.external_files import companion_files, read_mesh
 from flexclear.system.progress import silent
 from flexclear.workflow.execute import execute, find, states
 from flexclear.workflow.fingerprint import TREE, Sources
@@ -193,7 +193,7 @@ def test_companions_of_a_format_are_what_its_reader_opens(tmp_path: Path, name: 
     meshio.read(path)
     listening.clear()
     read_mesh(path, "recipe", "cannot be read", "remedy")
-    assert opened == {file.relative_to(tmp_path).as_posix() for file in (path, *companions(path))} == names
+    assert opened == {file.relative_to(tmp_path).as_posix() for file in (path, *companion_files(path))} == names
 
 
 def test_numbers_next_to_xdmf_are_companions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,9 +201,9 @@ def test_numbers_next_to_xdmf_are_companions(tmp_path: Path, monkeypatch: pytest
     monkeypatch.chdir(tmp_path.parent)
     items = "<DataItem Format='HDF'>\n  x&#46;h5:/data0\n</DataItem><DataItem Format='Binary'>b.bin</DataItem>"
     (tmp_path / "x.xdmf").write_text(f'<Xdmf><DataItem Format="XML">0 1</DataItem>{items}</Xdmf>')
-    assert list(companions(tmp_path / "x.xdmf")) == [tmp_path / "x.h5", Path("b.bin")]
+    assert list(companion_files(tmp_path / "x.xdmf")) == [tmp_path / "x.h5", Path("b.bin")]
     (tmp_path / "x.xdmf").write_text("<Xdmf>")
-    assert not list(companions(tmp_path / "x.xdmf"))
+    assert not list(companion_files(tmp_path / "x.xdmf"))
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_includes_without_end_are_refused(tmp_path: Path, includes: dict[str, li
     for name, others in includes.items():
         (tmp_path / name).write_text("".join(f"*INCLUDE, INPUT={other}\n" for other in others))
     with pytest.raises(InputError, match=words):
-        list(companions(tmp_path / "a.inp"))
+        list(companion_files(tmp_path / "a.inp"))
     (tmp_path / "body.toml").write_text(TETRAHEDRA.replace("body.ele", "a.inp"))
     with pytest.raises(InputError, match=words):
         mesh_task(tmp_path)

@@ -56,7 +56,7 @@ def interrupted(
 ) -> tuple[Any, int]:
     """The result of work that is killed again and again after some looks, and how often it was."""
     kills, looks = 0, 0
-    proper = stopping.check
+    proper = stopping.check_stop
 
     def look(*arguments: Any) -> None:
         nonlocal looks
@@ -65,10 +65,10 @@ def interrupted(
             raise KilledError
         proper(*arguments)
 
-    monkeypatch.setattr(stopping, "check", look)
+    monkeypatch.setattr(stopping, "check_stop", look)
     while True:
         try:
-            with journal.storage(folder, "key") as kept:
+            with journal.keep_journal(folder, "key") as kept:
                 found = work()
         except KilledError:
             kills += 1
@@ -77,7 +77,7 @@ def interrupted(
             assert list(folder.glob("key.*.part"))
             kept.remove()
             assert not list(folder.iterdir())
-            monkeypatch.setattr(stopping, "check", proper)
+            monkeypatch.setattr(stopping, "check_stop", proper)
             return found, kills
 
 
@@ -96,7 +96,7 @@ SECTIONS = check(
 def whole(of: str) -> xr.Dataset:
     """Of work that nobody interrupts, with one thread."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cores, "cores", lambda: 1)
+        patch.setattr(cores, "count_cores", lambda: 1)
         return WORK[of]()
 
 
@@ -143,7 +143,7 @@ def test_killed_work_goes_on_to_the_same_bits(
 ) -> None:
     """Killed with so many threads at work; what nobody kills has one."""
     expected = whole(of)
-    monkeypatch.setattr(cores, "cores", lambda: threads)
+    monkeypatch.setattr(cores, "count_cores", lambda: threads)
     monkeypatch.setattr(cores, "_others_idle", True)
     found, kills = interrupted(WORK[of], tmp_path, monkeypatch, looks)
     assert kills >= 1
@@ -173,10 +173,10 @@ def test_work_that_fails_between_its_parts_goes_on_to_the_same_bits(
         return proper(*arguments, **more)
 
     monkeypatch.setattr(place, failing)
-    with pytest.raises(KeyboardInterrupt), journal.storage(tmp_path, "key"):
+    with pytest.raises(KeyboardInterrupt), journal.keep_journal(tmp_path, "key"):
         WORK[of]()
     assert list(tmp_path.glob("*.part"))
-    with journal.storage(tmp_path, "key"):
+    with journal.keep_journal(tmp_path, "key"):
         assert WORK[of]().identical(expected)
 
 
@@ -184,8 +184,8 @@ def test_work_that_fails_between_its_parts_goes_on_to_the_same_bits(
 def test_what_is_left_of_a_member_is_not_used_when_a_bit_of_it_has_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cores, "cores", lambda: 1)
-    with journal.storage(tmp_path, "key"):
+    monkeypatch.setattr(cores, "count_cores", lambda: 1)
+    with journal.keep_journal(tmp_path, "key"):
         WORK["ensemble"]()
     parts = sorted(tmp_path.glob("*.part"))
     assert len(parts) == 4
@@ -193,7 +193,7 @@ def test_what_is_left_of_a_member_is_not_used_when_a_bit_of_it_has_changed(
         content = bytearray(path.read_bytes())
         content[len(content) // 2] ^= 1
         path.write_bytes(content)
-    with journal.storage(tmp_path, "key") as kept:
+    with journal.keep_journal(tmp_path, "key") as kept:
         assert all(kept.find(path.name.split(".")[1]) is None for path in parts)
         assert WORK["ensemble"]().identical(whole("ensemble"))
 
@@ -206,7 +206,7 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked(monkeypatch: py
 
     def progress(fraction: float | None, text: str) -> None:
         if fraction is not None and fraction > 0.3:
-            stopping.request("the time is over")
+            stopping.request_stop("the time is over")
 
     with pytest.raises(StoppedError) as caught:
         dynamics.simulate(scene, {}, progress)
@@ -233,7 +233,7 @@ def test_what_a_part_of_the_work_leaves_is_not_taken_for_what_there_is_of_it(
 
     monkeypatch.setattr(schedule, "execute", stopped)
     task = Task("ensemble", "bounce", "nothing:run", {}, "runs/bounce")
-    failed = schedule.attempt(task, {}, Store(tmp_path), Sources(tmp_path), silent)
+    failed = schedule.attempt_task(task, {}, Store(tmp_path), Sources(tmp_path), silent)
     assert isinstance(failed, schedule.Failure)
     assert failed.exit_code == 4
     assert failed.message == ("bounce ensemble: the time is over; run it again: finished parts are not computed again")

@@ -332,7 +332,7 @@ def test_a_scene_survives_the_way_through_its_parameters(root: Path):
         if path.parent.name == "sweeps":
             continue
         scene = load_scene(path)
-        reported = {"name": scene.name, "limits": scene.limits.written()}  # the context of its task
+        reported = {"name": scene.name, "limits": scene.limits.as_table()}  # the context of its task
         again = simulation.rebuild({**reported, **simulation.params(scene, ensemble=True)}, {})
         assert again.name == scene.name
         left_out = {"title", "description", "accuracy", "sections", "view"}

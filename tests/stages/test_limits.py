@@ -32,7 +32,7 @@ def test_a_run_that_memory_cannot_hold_is_refused_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ):
     """It was simulated to the end before."""
-    monkeypatch.setattr(machine, "memory", lambda: 10**9)
+    monkeypatch.setattr(machine, "available_memory", lambda: 10**9)
     path = written(tmp_path, SCENE.replace('"0.1 ms"', '"1 us"') + JOINT)
     begun = time.monotonic()
     reported = command("run", path, code=4).err
@@ -43,7 +43,7 @@ def test_a_run_that_memory_cannot_hold_is_refused_at_once(
 
 
 def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(machine, "memory", lambda: 0)
+    monkeypatch.setattr(machine, "available_memory", lambda: 0)
     path = written(tmp_path, SCENE + JOINT + '[limits]\nmemory = "1 GB"\ndisk = "1 GB"\n')
     simulation.check_run(load_scene(path), tmp_path)
     for key in ("memory", "disk"):
@@ -66,7 +66,7 @@ def test_rows_and_members_are_limits_that_a_scene_may_raise(tmp_path: Path, fres
     limits = {"limits.rows": 10**15, "limits.members": 10**6}
     load_scene(path, limits | {"output.interval": "1e-12 s", "ensemble.members": 200_000})
     raised = load_scene(path, limits | {"output.interval": "1e-12 s"})
-    for reported in ({}, {"limits": raised.limits.written()}):  # made again by a stage, which may not get them
+    for reported in ({}, {"limits": raised.limits.as_table()}):  # made again by a stage, which may not get them
         assert simulation.rebuild(simulation.params(raised) | reported).output.interval == 1e-12
     with pytest.raises(ResourceError, match=r"limits\.rows"):
         with_numbers(load_scene(path), {"output.interval": 1e-12})
@@ -114,7 +114,7 @@ def test_cells_are_counted_from_the_recipe():
 
 def test_files_are_judged_by_their_headers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A small file may hold much: an archive of zeros, a header that promises a matrix."""
-    monkeypatch.setattr(machine, "memory", lambda: 10**6)
+    monkeypatch.setattr(machine, "available_memory", lambda: 10**6)
     np.savez_compressed(tmp_path / "zeros.npz", node=np.zeros(10**6))
     assert (tmp_path / "zeros.npz").stat().st_size < 10**5
     with pytest.raises(ResourceError, match=r"'zeros.npz' unpacked takes about 32 MB"):

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from flexclear.artifacts import netcdf
-from flexclear.artifacts.labelled import label_arrays, of
+from flexclear.artifacts.labelled import label_arrays, label_dataset
 
 
 def everything() -> xr.Dataset:
@@ -79,7 +79,7 @@ def content(path: Path) -> dict[str, object]:
 def test_files_hold_what_those_of_xarray_do(bound: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every name, attribute, dimension, filter, chunk and value, in the same order; only their places differ."""
     monkeypatch.setattr(netcdf, "COMPRESSED", bound)
-    netcdf.write(tmp_path / "ours.nc", of(everything()))
+    netcdf.write(tmp_path / "ours.nc", label_dataset(everything()))
     by_xarray(tmp_path / "theirs.nc", everything())
     # as texts: not a number, which fills what was not written, equals nothing
     assert repr(content(tmp_path / "ours.nc")) == repr(content(tmp_path / "theirs.nc"))
@@ -97,7 +97,7 @@ def test_files_are_written_while_another_thread_imports_xarray(tmp_path: Path, m
     """By then there is a module, but without its lock."""
     theirs, name = by_xarray(tmp_path / "theirs.nc", everything()), "xarray.backends.netCDF4_"
     monkeypatch.setitem(sys.modules, name, ModuleType(name))
-    netcdf.write(tmp_path / "a.nc", of(everything()))
+    netcdf.write(tmp_path / "a.nc", label_dataset(everything()))
     assert repr(netcdf.read((tmp_path / "a.nc").read_bytes())) == repr(netcdf.read(theirs))
 
 

@@ -51,7 +51,7 @@ def parting(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def processors(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
-    monkeypatch.setattr(cores, "cores", lambda: count)
+    monkeypatch.setattr(cores, "count_cores", lambda: count)
     monkeypatch.setattr(cores, "_others_idle", True)
 
 
@@ -278,11 +278,11 @@ def test_both_are_stopped_in_good_order(stopped: str, monkeypatch: pytest.Monkey
 
     def progress(fraction: float | None, text: str) -> None:
         if fraction is not None and fraction > 0.3 and stopped == "run":
-            stopping.request("the time is over")
+            stopping.request_stop("the time is over")
 
     def late_twin(self: Pair, twin: Any, alive: Progress) -> bool:
         assert self._ended.wait(PATIENCE)
-        stopping.request("the time is over")
+        stopping.request_stop("the time is over")
         return False
 
     with monkeypatch.context() as patch:
@@ -329,7 +329,7 @@ def test_concurrent_work_ends_with_its_block(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_workers_of_another_program_take_no_second_processor() -> None:
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        assert not pool.submit(cores.free).result()
+        assert not pool.submit(cores.has_free_processor).result()
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.usefixtures("shared_results")
 
 def _tight(scene: Scene) -> Scene:
     """Without the clearance, which is another matter."""
-    return variants.without(scene, [e for e in variants.effects(scene) if e.name.startswith("joint.")])
+    return variants.without_effects(scene, [e for e in variants.effects(scene) if e.name.startswith("joint.")])
 
 
 def test_fewer_modes_to_choose_from_are_the_static_ones_and_half_of_the_others(tmp_path: Path):
@@ -199,7 +199,7 @@ def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path, command: Command)
 def test_what_nothing_couples_to_what_is_asked_for_is_not_integrated(tmp_path: Path):
     """A pendulum next to the leg moves by itself: the leg's motion is the same without it, to the last tolerance."""
     leg = _tight(load_scene(write("leg", tmp_path)[0]))
-    stiff = variants.without(leg, [e for e in variants.effects(leg) if e.name.startswith("body.")])
+    stiff = variants.without_effects(leg, [e for e in variants.effects(leg) if e.name.startswith("body.")])
     parts = stiff.model_dump(mode="json", exclude_none=True)
     bob = rigid(1.0, 0.01, {"pivot": frame((-0.1, 0.0, 0.0))}, pose=frame((0.1, 0.0, 0.0)))
     hinge = joint("spherical", "ground.base", "bob.pivot")

@@ -189,7 +189,7 @@ def test_where_joints_leave_a_freedom_there_is_no_bound(tmp_path: Path):
 
 def _tight(scene: Scene) -> Scene:
     """Without the clearance, which is another matter."""
-    return variants.without(scene, [e for e in variants.effects(scene) if e.name.startswith("joint.")])
+    return variants.without_effects(scene, [e for e in variants.effects(scene) if e.name.startswith("joint.")])
 
 
 def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(standing: Pilot):

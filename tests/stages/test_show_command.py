@@ -75,7 +75,7 @@ def test_the_command_writes_where_it_runs(
     page = (tmp_path / "pendulum_start.html").read_text(encoding="utf-8")
     reported = json.loads(re.search(r"<script type='application/json'>(.*?)</script>", page, re.DOTALL)[1])  # type: ignore[index]
     assert {label["text"] for label in reported["labels"]} == {"bob", "hinge"}
-    assert (tmp_path / "pendulum_start.png").exists() == gl.works()
+    assert (tmp_path / "pendulum_start.png").exists() == gl.can_draw()
     assert "pendulum_start.html" in said.out
 
 

@@ -16,7 +16,7 @@ import xarray as xr
 
 from flexclear.artifacts import disk, netcdf
 from flexclear.artifacts.disk import publish
-from flexclear.artifacts.labelled import of
+from flexclear.artifacts.labelled import label_dataset
 from flexclear.artifacts.store import Record, Store, write_dataset
 from flexclear.commands.new import write
 from flexclear.system.errors import ResourceError
@@ -163,7 +163,7 @@ def test_the_library_reports_every_byte_that_it_cannot_write(
 ):
     """What it writes is not read back: wherever a disk ends, it raises an error."""
     monkeypatch.setattr(netcdf, "COMPRESSED", compressed)
-    data, drawn = of(dataset(3_000)), Random(1)
+    data, drawn = label_dataset(dataset(3_000)), Random(1)
     netcdf.write(tmp_path / "whole.nc", data)
     size = (tmp_path / "whole.nc").stat().st_size
     for limit in {0, 1, 100, size - 1, size - 2, size - 100, size - 4096, *(drawn.randrange(size) for _ in range(40))}:
@@ -228,7 +228,7 @@ def test_shown_files_follow_the_current_artifact(store: Store):
     second = store.put("simulate", "l" * 32, {"nc": dataset(9)}, {"parameter c": "2"})
     store.show(second, "runs/tiny", {"nc": "run.nc"}, "simulate")
     assert store.load(second).equals(xr.load_dataset(shown, decode_times=False))
-    last = store.last("runs/tiny", "simulate")
+    last = store.last_shown("runs/tiny", "simulate")
     assert last is not None
     assert (last.key, dict(last.facts)) == ("l" * 32, {"parameter c": "2"})
     assert not list(store.root.rglob("*.tmp"))
@@ -272,13 +272,13 @@ def test_a_flipped_bit_in_a_record_makes_the_artifact_absent(store: Store, said:
     whole = path.read_bytes()
     for place in range(0, len(whole), 7):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
-        found = store.last("runs/tiny", "simulate") if shown else store.find("simulate", KEY)
+        found = store.last_shown("runs/tiny", "simulate") if shown else store.find("simulate", KEY)
         assert found is None or found == record  # white space says nothing
         line = f"results/cache/simulate/{KEY}.json is damaged or is not a record; it will be computed again"
         assert said == ([] if shown or found else [line])
         said.clear()
     path.write_bytes(whole)
-    assert store.last("runs/tiny", "simulate") == record
+    assert store.last_shown("runs/tiny", "simulate") == record
 
 
 def test_a_folder_in_the_place_of_a_file_is_renamed_with_a_word(store: Store, capsys: pytest.CaptureFixture[str]):

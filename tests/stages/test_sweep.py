@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.special import ellipk
 
 import flexclear as fc
-from flexclear.artifacts.points import variable
+from flexclear.artifacts.points import variable_name
 from flexclear.commands.__main__ import main
 from flexclear.dynamics import analyses
 from flexclear.dynamics.run.evaluation import engine
@@ -268,7 +268,7 @@ def test_quantities_and_parameters_of_any_name_can_be_written(tmp_path: Path):
     """What a file cannot name begins with "_"; of parameters, names that NetCDF refuses are refused."""
     owners = load_scene("scenes/checks/pendulum.toml").owners()
     names = ["(bob.position.x - bob.position.y).final", "norm(bob.velocity).largest", "(bob.position.x / 2).final"]
-    kept = [variable(parse_recorded(name, owners), "values") for name in names]
+    kept = [variable_name(parse_recorded(name, owners), "values") for name in names]
     given = ["µ", "2nd mass", "mass in %", "body.bob.mass", "m" * 256]
     for name in given:
         read_sweep(

@@ -19,14 +19,14 @@ from flexclear.system.errors import ResourceError
 from flexclear.workflow import cores, stopping, workers
 from flexclear.workflow.fingerprint import Sources
 from flexclear.workflow.progress import Monitor
-from flexclear.workflow.schedule import bring
+from flexclear.workflow.schedule import bring_up_to_date
 from flexclear.workflow.task import Task
 from tests.processes import python
 
 
 def one(width: int = 1) -> int:
     """Number of the process that does something for a team of that width."""
-    with workers.team(width) as team, workers.report_lost_worker():
+    with workers.worker_team(width) as team, workers.report_lost_worker():
         return int(team.pool.submit(os.getpid).result())
 
 
@@ -39,12 +39,12 @@ def alive(process: int) -> bool:
 
 
 def fail() -> None:
-    with pytest.raises(KeyError), workers.team(1):
+    with pytest.raises(KeyError), workers.worker_team(1):
         raise KeyError
 
 
 def stop() -> None:
-    with stopping.stop_after(-1.0, "time is over"), workers.team(1):
+    with stopping.stop_after(-1.0, "time is over"), workers.worker_team(1):
         assert stopping.stop_reason()
 
 
@@ -52,7 +52,7 @@ def test_a_command_starts_its_workers_once() -> None:
     """Also where a later part of it wants as many as there are cores."""
     with workers.keep_workers():
         first = one()
-        assert one(cores.cores()) == first
+        assert one(cores.count_cores()) == first
         assert alive(first)
     assert not alive(first)
 
@@ -74,7 +74,7 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
     """Whoever asks for pictures, and can do without them, looks which of its tasks failed; a worker has copies."""
     # without the run that it is of, it cannot be done
     tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in ("a", "b")]
-    outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
+    outcome = bring_up_to_date(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
     assert {failure.task for failure in outcome.failures} == {task for task in tasks}
 
 
@@ -84,7 +84,7 @@ from flexclear.commands import __main__, schema
 def command(options):
     raise BrokenPipeError(32, "Broken pipe")
 if sys.argv[1] == "helper":
-    schema.command = command
+    schema.run_command = command
 sys.exit(__main__.main(["schema"]))
 """
 
@@ -172,7 +172,7 @@ def stopped_reason(_: int) -> str:
 
 def test_a_stop_reaches_workers_to_which_sigterm_was_sent_and_does_not_wait_for_killed_ones() -> None:
     """As `timeout` and services send it, to all processes of a command."""
-    with workers.team(2) as team, workers.report_lost_worker():
+    with workers.worker_team(2) as team, workers.report_lost_worker():
         futures = [team.pool.submit(stopped_reason, k) for k in range(2)]
         busy = list(team.pool._processes)
         while any(not future.running() for future in futures):
@@ -182,7 +182,7 @@ def test_a_stop_reaches_workers_to_which_sigterm_was_sent_and_does_not_wait_for_
             os.kill(process, signal.SIGTERM)
         team.channel.request_stop("enough")
         assert [future.result(60.0) for future in futures] == ["enough"] * 2
-    with workers.team(1) as team:
+    with workers.worker_team(1) as team:
         killed = team.pool.submit(os.getpid).result()
         os.kill(killed, signal.SIGKILL)
         while alive(killed):
@@ -195,7 +195,7 @@ def test_a_stop_reaches_workers_to_which_sigterm_was_sent_and_does_not_wait_for_
 
 def test_many_reports_arrive_in_their_order() -> None:
     """Whoever writes waits while the queue is full, and goes on when the parent reads."""
-    with workers.team(1) as team:
+    with workers.worker_team(1) as team:
         future, news = team.pool.submit(chatty, 3000), []
         while not future.done() or not team.channel.reports.empty():
             news += team.channel.take_reports()

@@ -55,7 +55,7 @@ def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: 
     """Stage: draw ``<name>.png`` and ``.svg`` of a figure, or ``.csv`` and ``.md`` of a table; inputs by reference."""
     from flexclear.publishing import files, style
 
-    with style.style():
+    with style.set_style():
         return dict(files(params["figure"], figure(params["figure"]).make(dict(inputs))))
 
 

@@ -33,8 +33,6 @@ LARGEST_TABLE = 64 << 20
 PIECE = 1 << 17
 #: error numbers of a full or limited disk
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-#: age at which temporary files of other machines that share the disk, and unfinished work, are removed [s]
-ABANDONED_AFTER = 7 * 86400.0
 #: error numbers of a file system without locks
 LOCKLESS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 _TEMPORARY = re.compile(r"\.(?P<stem>[^.]*)\.(?P<host>[0-9a-f]{8})-(?P<pid>\d+)\.[0-9a-f]{8}\.tmp")
@@ -70,16 +68,16 @@ def digest_of(path: Path) -> str:
 
 def publish(path: Path, content: bytes) -> str:
     """Write a file so that it exists in full or not at all; return its SHA-256 digest."""
-    with temporary(path) as scratch:
+    with temporary_name(path) as scratch:
         scratch.write_bytes(content)
         if scratch.read_bytes() != content:
             raise OSError(errno.EIO, "the written content cannot be read back", str(path))
-        digest = settle(scratch, path)
+        digest = commit_file(scratch, path)
     platforms.sync_folder(path.parent)
     return digest
 
 
-def settle(scratch: Path, path: Path) -> str:
+def commit_file(scratch: Path, path: Path) -> str:
     """Force a file's bytes to the disk and rename the file to `path`; return its SHA-256 digest.
 
     The new name is on the disk only after `platforms.sync_folder`, which covers all names of the folder.
@@ -114,7 +112,7 @@ def _digest(table: Mapping[str, Any]) -> str:
 def copy(source: Path, target: Path) -> None:
     """Make `target` a read-only copy with the time of `source`; where the disk can share blocks, it takes no space."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    with temporary(target) as scratch:
+    with temporary_name(target) as scratch:
         with source.open("rb") as old, scratch.open("wb") as new:
             if not platforms.share_blocks(old, new):
                 shutil.copyfileobj(old, new, PIECE)
@@ -135,7 +133,7 @@ def is_copy(source: Path, target: Path) -> bool:
 
 
 @contextlib.contextmanager
-def temporary(path: Path) -> Iterator[Path]:
+def temporary_name(path: Path) -> Iterator[Path]:
     """Yield a name next to `path` that no other process uses; remove the file at the end, also after an error."""
     stem = path.name.lstrip(".").partition(".")[0]
     scratch = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
@@ -232,12 +230,14 @@ def _is_abandoned(path: Path) -> bool:
         return False  # not a file of this program
     if match["host"] != _host():
         return _is_old(path)
-    return not platforms.alive(int(match["pid"]))
+    return not platforms.is_alive(int(match["pid"]))
 
 
 def _is_old(path: Path) -> bool:
     with contextlib.suppress(OSError):
-        return time.time() - path.stat().st_mtime > ABANDONED_AFTER
+        # a week: age at which temporary files of other machines that share the disk, and unfinished work, are
+        # removed [s]
+        return time.time() - path.stat().st_mtime > 7 * 86400.0
     return False
 
 

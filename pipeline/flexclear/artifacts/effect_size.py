@@ -24,7 +24,7 @@ import xarray as xr
 from scipy.special import stdtrit
 
 from flexclear.artifacts.points import Point, join_points, unpack_points
-from flexclear.artifacts.quantities import separated_from
+from flexclear.artifacts.quantities import index_of_separation
 from flexclear.numerics.rotations import rotation_between
 from flexclear.scene.quantity import CONTACT_REDUCTIONS, Quantity, Recorded
 
@@ -96,7 +96,7 @@ class Agreement:
         """True when the error exceeds the allowed error by more than chance."""
         return self.error - self.chance > self.allowed
 
-    def enough(self, members: int) -> float:
+    def deciding_members(self, members: int) -> float:
         """Return how many members would decide if the difference stays as it is; infinity where no number would.
 
         members: number of members behind this agreement.
@@ -116,12 +116,15 @@ def compared_values(owners: Mapping[str, Collection[str]], chosen: Sequence[Quan
     owners: names of the scene's components, by kind.
     """
     there = [q for q in chosen if q.is_there(owners)]
-    every = [*(one for q in there for one in _with_reductions(q)), *(_whole(q) for q in there if q.component)]
+    every = [
+        *(one for q in there for one in _with_reductions(q)),
+        *(_largest_of_vector(q) for q in there if q.component),
+    ]
     every += [Recorded(q, "series") for q in there if q.kind in ("peak_force", "impulse")]
     return list({one.name: one for one in every}.values())
 
 
-def _whole(quantity: Quantity) -> Recorded:
+def _largest_of_vector(quantity: Quantity) -> Recorded:
     """Return the largest magnitude of the vector of which a quantity is a component."""
     return Recorded(replace(quantity, component="", text=""), "largest")
 
@@ -158,7 +161,11 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
         differences.append(float(_excess_over_chance(distance, uncertainty).max(initial=0.0)))
         uncertainties.append(float(uncertainty.max(initial=0.0)))
     result = Influence(max(differences), max(uncertainties))
-    return Influence(0.0) if result.most <= max(rounding(a, quantity), rounding(b, quantity)) else result
+    return (
+        Influence(0.0)
+        if result.most <= max(rounding_threshold(a, quantity), rounding_threshold(b, quantity))
+        else result
+    )
 
 
 def _distance_of_means(a: Point, b: Point, what: Recorded, members: int) -> tuple[np.ndarray, np.ndarray]:
@@ -188,21 +195,21 @@ def predictable_outputs(points: Sequence[Point], chosen: Sequence[Quantity], ful
     """Return the number of outputs up to which the members of each point are one motion: 0 where they never are, None
     where they always are.
 
-    They separate where they visibly differ (`quantities.separated_from`), relative to the quantity's size in `full`, in
-    positions and velocities where such quantities are chosen: forces of impacts differ for moments before.
+    They separate where they visibly differ (`quantities.index_of_separation`), relative to the quantity's size in
+    `full`, in positions and velocities where such quantities are chosen: forces of impacts differ for moments before.
     """
     outputs, series = list[int](), [q for q in chosen if q.over_time]
     for quantity in [q for q in series if q.unit in MOTIONS] or series:
-        what, scale = Recorded(quantity, "series"), size(full, quantity)
+        what, scale = Recorded(quantity, "series"), reference_size(full, quantity)
         for point in points:
-            if what.name in point.deviation and scale > rounding(full, quantity):
+            if what.name in point.deviation and scale > rounding_threshold(full, quantity):
                 separation = _deviations(point, what) / scale
-                first = separated_from(np.linspace(0.0, 1.0, len(separation)), separation, 1.0)
+                first = index_of_separation(np.linspace(0.0, 1.0, len(separation)), separation, 1.0)
                 outputs += [] if first is None else [first if first > 1 else 0]
     return min(outputs, default=None)
 
 
-def change(without: Point, full: Point, quantity: Quantity, members: int) -> Influence:
+def influence_of_removal(without: Point, full: Point, quantity: Quantity, members: int) -> Influence:
     """Return the `influence` of what a variant lacks on the full scene; nan where one of them was refused."""
     refused = without.refused or full.refused
     return Influence(np.nan, np.nan) if refused else influence(without, full, quantity, members)
@@ -255,9 +262,11 @@ def predictable_difference(
     )
     uncertainty = chance(members) * spread + error
     sure = distance >= REAL * uncertainty
-    if not (sure & (distance > max(rounding(a, quantity), rounding(b, quantity)))).any():
+    if not (sure & (distance > max(rounding_threshold(a, quantity), rounding_threshold(b, quantity)))).any():
         most = float((distance + uncertainty).max())
-        return Influence(0.0, 0.0 if most <= max(rounding(a, quantity), rounding(b, quantity)) else most)
+        return Influence(
+            0.0, 0.0 if most <= max(rounding_threshold(a, quantity), rounding_threshold(b, quantity)) else most
+        )
     at = int(np.argmax(np.where(sure, distance - uncertainty, -1.0)))
     return Influence(float(distance[at]), float(uncertainty[at]))
 
@@ -377,7 +386,7 @@ def _impact_times(a: Point, b: Point, name: str) -> Influence:
     return Influence(max(abs(float(a.values[f"{name}.{r}"] - b.values[f"{name}.{r}"])) for r in ("first", "last")))
 
 
-def size(point: Point, quantity: Quantity) -> float:
+def reference_size(point: Point, quantity: Quantity) -> float:
     """Return the reference of relative accuracies: largest change from the start, or value of forces and rates."""
     name = quantity.name
     if quantity.kind == "impact_times":
@@ -392,9 +401,9 @@ def size(point: Point, quantity: Quantity) -> float:
     return float(np.abs(point.values[f"{name}.largest"]))
 
 
-def rounding(point: Point, quantity: Quantity) -> float:
+def rounding_threshold(point: Point, quantity: Quantity) -> float:
     """Return the value below which a vector's component is rounding, such as motion across a plane; 0 for others."""
-    return ROUNDING * float(point.values.get(_whole(quantity).name, 0.0)) if quantity.component else 0.0
+    return ROUNDING * float(point.values.get(_largest_of_vector(quantity).name, 0.0)) if quantity.component else 0.0
 
 
 def _as_rows(values: np.ndarray) -> np.ndarray:

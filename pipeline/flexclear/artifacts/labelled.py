@@ -106,7 +106,7 @@ def _array(name: str, value: Any) -> LabelledArray:
     return LabelledArray((dims,) if isinstance(dims, str) else tuple(dims), np.asarray(values), *attrs)
 
 
-def of(dataset: xr.Dataset | LabelledArrays) -> LabelledArrays:
+def label_dataset(dataset: xr.Dataset | LabelledArrays) -> LabelledArrays:
     """Return the labelled arrays of a dataset; values are shared."""
     if isinstance(dataset, LabelledArrays):
         return dataset

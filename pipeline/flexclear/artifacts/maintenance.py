@@ -15,8 +15,6 @@ from flexclear.system import platforms
 #: suffixes of files next to artifacts that belong to none
 NO_ARTIFACT = (".json", ".lock", ".part", ".tmp")
 DAY = 86400.0
-#: time for which a file of an artifact may lack its record [s]
-YOUNG = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +51,11 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
             damaged.append(fault)
         statuses = [file.stat() for file in files if file.is_file()]
         artifacts.append(Artifact(record, sum(s.st_size for s in statuses), time.time() - path.stat().st_mtime))
-    damaged += [f"{store.below(path)} is damaged or is not a record" for path in unreadable]
+    damaged += [f"{store.shorten_path(path)} is damaged or is not a record" for path in unreadable]
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 
 
-def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
+def list_prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
     """Return artifacts that no folder of results shows, and that were written more than `older` seconds ago.
 
     Inputs of shown artifacts stay as well: without them they would be computed again. A sweep shows its families, all
@@ -103,11 +101,11 @@ def shown_faults(store: Store, below: Path) -> list[str]:
         for path in sorted(facts.parent.iterdir()) if known else ():
             whole = path.suffix == ".nc" and not path.stem.endswith((PARTIAL, ".edited"))
             if (whole or path.name in names) and path.is_file() and sha256(path.read_bytes()) not in known:
-                faults.append(f"{store.below(path)} differs from its artifact; the next command restores it")
+                faults.append(f"{store.shorten_path(path)} differs from its artifact; the next command restores it")
     return faults
 
 
-def find(store: Store, what: str) -> Record | None:
+def find_record(store: Store, what: str) -> Record | None:
     """Return the record with a key, or a unique beginning of a key, or of a shown file; None without a match."""
     path = Path(what)
     if path.is_file():
@@ -148,5 +146,6 @@ def _orphans(store: Store, known: set[Path]) -> Iterator[Path]:
     """Yield files of artifacts without a record, as of a process that died; young files may be about to get one."""
     for path in sorted((store.root / "cache").rglob("*")):
         ours = path.is_file() and path not in known and not path.name.endswith(NO_ARTIFACT)
-        if ours and time.time() - path.stat().st_mtime > YOUNG:
+        # 3600.0: time for which a file of an artifact may lack its record [s]
+        if ours and time.time() - path.stat().st_mtime > 3600.0:
             yield path

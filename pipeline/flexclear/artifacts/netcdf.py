@@ -102,11 +102,11 @@ def read(content: bytes) -> LabelledArrays:
     with _lock_library(), netCDF4.Dataset("in memory", memory=content) as file:
         file.set_auto_maskandscale(False)
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
-        coords = {name for name in file.variables if name in file.dimensions} | set(_taken_coordinates(attrs))
+        coords = {name for name in file.variables if name in file.dimensions} | set(_remove_coordinate_list(attrs))
         variables = {}
         for name, variable in file.variables.items():
             own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != _FILL}
-            coords |= set(_taken_coordinates(own))
+            coords |= set(_remove_coordinate_list(own))
             values = np.asarray(variable[...], dtype=str if variable.dtype is str else None)
             if own.get("dtype") == "bool":
                 del own["dtype"]
@@ -115,6 +115,6 @@ def read(content: bytes) -> LabelledArrays:
     return LabelledArrays(variables, frozenset(coords & variables.keys()), attrs)
 
 
-def _taken_coordinates(attrs: dict[str, Any]) -> list[str]:
+def _remove_coordinate_list(attrs: dict[str, Any]) -> list[str]:
     """Remove the list of coordinates from the attributes and return it."""
     return str(attrs.pop(_COORDINATES, "")).split()

@@ -47,15 +47,15 @@ class Point:
     members: Sequence[Values] = ()
 
 
-def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Dataset:
+def dataset_of_batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Dataset:
     """Return finished points, with their keys, as a dataset."""
     done = list(points.values())
     variables: dict[str, Any] = {}
     for statistic, one in itertools.product(STATISTICS, recorded):
         values = [getattr(point, statistic)[one.name] for point in done if one.name in getattr(point, statistic)]
         if values:
-            rows = _rows(done, one.name, statistic, np.shape(values[0]))
-            variables[variable(one, statistic)] = (("point", *one.dims), rows)
+            rows = _stack_values(done, one.name, statistic, np.shape(values[0]))
+            variables[variable_name(one, statistic)] = (("point", *one.dims), rows)
     variables["evaluations"] = (("point",), np.array([point.evaluations for point in done], dtype=np.int64))
     variables["refused"] = (("point",), np.array([point.refused for point in done], dtype=object))
     return xr.Dataset(variables, coords={"key": ("point", np.array(list(points), dtype=object))})
@@ -88,14 +88,16 @@ def unpack_points(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str,
     for k, key in enumerate(arrays["key"]):
         refused = str(arrays["refused"][k])
         values, error, deviation = (
-            {} if refused else {q.name: arrays[name][k] for q in recorded if (name := variable(q, statistic)) in arrays}
+            {}
+            if refused
+            else {q.name: arrays[name][k] for q in recorded if (name := variable_name(q, statistic)) in arrays}
             for statistic in STATISTICS
         )
         points[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
     return points
 
 
-def variable(one: Recorded, statistic: str) -> str:
+def variable_name(one: Recorded, statistic: str) -> str:
     """Return the name of a variable, as files allow it: with "÷" for "/", and "_" before a sign or a bracket."""
     name = (one.name if statistic == "values" else f"{one.name}.{statistic}").replace("/", "÷")
     return name if name[0].isalnum() else f"_{name}"
@@ -122,9 +124,9 @@ def dataset(
     variables: dict[str, Any] = {}
     for one, statistic in itertools.product(recorded, statistics):
         inner = tuple(lengths[dim] for dim in one.dims)
-        rows = _rows(every, one.name, statistic, inner).reshape((*shape, *inner))
+        rows = _stack_values(every, one.name, statistic, inner).reshape((*shape, *inner))
         described = {"units": udunits(one.unit), "long_name": f"{one.meaning}{MEANINGS[statistic]}"}
-        variables[variable(one, statistic)] = ((*dims, *one.dims), rows, described)
+        variables[variable_name(one, statistic)] = ((*dims, *one.dims), rows, described)
     status = [NOT_RUN if p is None else REFUSED if p.refused else DONE for p in every]
     plain = {
         "status": (np.array(status, dtype=np.int8), "state of the point"),
@@ -157,7 +159,7 @@ def dimensions(time: np.ndarray, sections: int) -> dict[str, int]:
     return {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
 
 
-def _rows(points: Sequence[Point | None], name: str, statistic: str, inner: tuple[int, ...]) -> np.ndarray:
+def _stack_values(points: Sequence[Point | None], name: str, statistic: str, inner: tuple[int, ...]) -> np.ndarray:
     """Return values of points, shape (points, *inner); NaN where they are missing."""
     rows = np.full((len(points), *inner), np.nan)
     for k, point in enumerate(points):

@@ -53,7 +53,7 @@ def indices_of_lasting(time: np.ndarray, separated: np.ndarray, least: float) ->
     return np.flatnonzero(separated & (until > time + least))
 
 
-def divergence(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
+def index_of_divergence(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
     """Return the index of the first time at which two runs diverge, assumed to be final; None where they do not.
 
     time [s], separation (fraction of the largest motion): shape (n,). span: duration of the whole run [s].
@@ -61,13 +61,13 @@ def divergence(time: np.ndarray, separation: np.ndarray, span: float) -> int | N
     return next(iter(indices_of_lasting(time, separation > DIVERGED, LASTING * span).tolist()), None)
 
 
-def separated_from(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
+def index_of_separation(time: np.ndarray, separation: np.ndarray, span: float) -> int | None:
     """Return the index of the time from which two runs are visibly separated; None where they stay close.
 
     From there on they are separated most of the time, until they diverge or end: damped motions forget an impact after
-    some others, and such a temporary difference does not count. Arguments: as in `divergence`.
+    some others, and such a temporary difference does not count. Arguments: as in `index_of_divergence`.
     """
-    diverged = divergence(time, separation, span)
+    diverged = index_of_divergence(time, separation, span)
     if diverged is not None:
         time, separation = time[: diverged + 1], separation[: diverged + 1]
     visible = separation > SEPARATED
@@ -135,7 +135,7 @@ def evaluate(run: xr.Dataset, text: str) -> xr.DataArray:
         raise InputError(f"quantity '{text}'", str(error)) from None
     attributes = {"units": unit(run, quantity), "long_name": quantity.name}
     if not quantity.over_time:
-        return xr.DataArray(np.squeeze(events(run, quantity)), name=quantity.name, attrs=attributes)
+        return xr.DataArray(np.squeeze(contact_values(run, quantity)), name=quantity.name, attrs=attributes)
     values, dim = series(run, quantity), quantity.dim
     shown, dims = (values, ("time", dim)) if dim else (values[:, 0], ("time",))
     return xr.DataArray(shown, {name: run[name].variable for name in dims}, dims, quantity.name, attributes)
@@ -177,7 +177,7 @@ def unit(run: xr.Dataset, quantity: Quantity) -> str:
     return kind.units[1] if turns else quantity.unit
 
 
-def events(run: Labelled, quantity: Quantity, until: float = np.inf) -> np.ndarray:
+def contact_values(run: Labelled, quantity: Quantity, until: float = np.inf) -> np.ndarray:
     """Return impact times [s], or the largest contact force [N], of contacts that begin up to `until` [s], shape (n,).
 
     For `impulse` return the total normal impulse of the run [N s].
@@ -193,7 +193,7 @@ def events(run: Labelled, quantity: Quantity, until: float = np.inf) -> np.ndarr
     return times
 
 
-def so_far(run: Labelled, quantity: Quantity, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
+def running_extremes(run: Labelled, quantity: Quantity, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Return the largest force of the contacts that began up to each row's time [N], or the impulse [N s], (row,).
 
     time: of all rows [s].
@@ -222,7 +222,7 @@ def deviation(run: Labelled, reference: Labelled, quantity: Quantity) -> tuple[n
     return run["time"].values[i], distance
 
 
-def error(run: Labelled, reference: Labelled, quantity: Quantity, until: float = np.inf) -> float:
+def largest_distance(run: Labelled, reference: Labelled, quantity: Quantity, until: float = np.inf) -> float:
     """Return the largest distance between two runs up to a time [s], in the quantity's unit.
 
     The error is infinite when the runs differ in the number of impacts before `until`.
@@ -234,7 +234,7 @@ def error(run: Labelled, reference: Labelled, quantity: Quantity, until: float =
         i, j = common_times(run["time"].values, reference["time"].values)
         last = max(int(np.searchsorted(run["time"].values[i], until, side="right")) - 1, 0)
         return float(np.abs(series(run, quantity)[i[last]] - series(reference, quantity)[j[last]]).max())
-    a, b = events(run, quantity, until), events(reference, quantity, until)
+    a, b = contact_values(run, quantity, until), contact_values(reference, quantity, until)
     return float(np.abs(a - b).max(initial=0.0)) if len(a) == len(b) else np.inf
 
 
@@ -244,10 +244,10 @@ def scale(run: Labelled, quantity: Quantity) -> float:
     For impact times it is the time from the start to the last impact.
     """
     if quantity.kind == "impact_times":
-        times = events(run, quantity)
+        times = contact_values(run, quantity)
         return float(times[-1] - run["time"].values[0]) if len(times) else 0.0
     if not quantity.over_time:
-        return float(np.abs(events(run, quantity)).max(initial=0.0))
+        return float(np.abs(contact_values(run, quantity)).max(initial=0.0))
     values = series(run, quantity)
     if quantity.kind == "orientation":
         return float(rotation_between(values[:1], values).max())
@@ -272,8 +272,8 @@ def natural_size(run: Labelled, unit: str) -> float:
     return energy if unit == "N m" else energy / extent if unit == "N" and extent > 0.0 else 0.0
 
 
-def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
-    """Return the part of a run that `error` and `scale` need for these quantities."""
+def select_variables(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
+    """Return the part of a run that `largest_distance` and `scale` need for these quantities."""
     recorded: dict[str, xr.DataArray] = {}
     terms = [term for quantity in chosen for term in quantity.terms()]
     for kind in {KINDS[term.kind] for term in terms if term.kind not in ("peak_force", "impact_times")}:

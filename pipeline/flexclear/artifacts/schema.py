@@ -14,7 +14,7 @@ import numpy as np
 from flexclear.artifacts.coordinates import AXES as AXES
 from flexclear.artifacts.coordinates import COORDINATES, turning, with_names
 from flexclear.artifacts.coordinates import QUATERNION as QUATERNION
-from flexclear.artifacts.labelled import LabelledArray, LabelledArrays, of
+from flexclear.artifacts.labelled import LabelledArray, LabelledArrays, label_dataset
 from flexclear.scene.output import Schema as Schema
 from flexclear.scene.output import Variable as Variable
 from flexclear.scene.output import table
@@ -314,7 +314,7 @@ _MAY_BE_OPEN = ("event_", "impact_")
 
 def conform(dataset: xr.Dataset, schema: Schema, *, title: str, **attributes: str | int | float) -> xr.Dataset:
     """Return a dataset with units, long names and coordinates of `schema`, see `conform_arrays`."""
-    return conform_arrays(of(dataset), schema, title=title, **attributes).to_xarray()
+    return conform_arrays(label_dataset(dataset), schema, title=title, **attributes).to_xarray()
 
 
 def conform_arrays(

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.artifacts.disk import (
+    commit_file,
     copy,
     digest_of,
     disk_limits,
@@ -27,9 +28,8 @@ from flexclear.artifacts.disk import (
     read_checked,
     read_whole,
     remove_leftovers,
-    settle,
     sha256,
-    temporary,
+    temporary_name,
 )
 from flexclear.system import platforms
 from flexclear.system.errors import ResourceError, terminal_text
@@ -99,7 +99,7 @@ class Store:
         record = read_record(path)
         if record is None and not path.exists():
             return None
-        fault = f"{self.below(path)} is damaged or is not a record" if record is None else self.fault(record)
+        fault = f"{self.shorten_path(path)} is damaged or is not a record" if record is None else self.fault(record)
         if fault is not None:
             self.say(f"{fault}; it will be computed again")
         return record if fault is None else None
@@ -111,9 +111,9 @@ class Store:
             try:
                 actual = digest_of(path)
             except OSError:
-                return f"{self.below(path)} is missing or is not a file"
+                return f"{self.shorten_path(path)} is missing or is not a file"
             if actual != digest:
-                return f"{self.below(path)} is corrupt (its content differs from its sha256)"
+                return f"{self.shorten_path(path)} is corrupt (its content differs from its sha256)"
         return None
 
     def put(
@@ -152,12 +152,12 @@ class Store:
         path = self.path(record.stage, record.key, MAIN)
         content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
-            raise ResourceError(f"{self.below(path)} changed while it was read; run again to rebuild it")
+            raise ResourceError(f"{self.shorten_path(path)} changed while it was read; run again to rebuild it")
         try:
             return netcdf.read(content)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # the digest is right: it never was a dataset
             raise ResourceError(
-                f"{self.below(path)} is not a dataset ({terminal_text(str(error))}); remove it"
+                f"{self.shorten_path(path)} is not a dataset ({terminal_text(str(error))}); remove it"
             ) from None
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
@@ -182,7 +182,7 @@ class Store:
 
     def _set_edited_aside(self, target: Path, name: str, folder: str, label: str) -> None:
         """Rename a shown file that was edited, so that showing the artifact does not overwrite the edit."""
-        last = self.last(folder, label)
+        last = self.last_shown(folder, label)
         platforms.set_aside(target)
         if not target.is_file() or target.is_symlink():
             return
@@ -191,7 +191,9 @@ class Store:
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
             platforms.replace(target, aside)
-            self.say(f"{self.below(target)} was edited; the edited file is now {aside.name}, the result is restored")
+            self.say(
+                f"{self.shorten_path(target)} was edited; the edited file is now {aside.name}, the result is restored"
+            )
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
         """Write an incomplete run next to the shown files; return its path, or None where nothing is shown.
@@ -216,7 +218,7 @@ class Store:
             self._write_outdated_note(folder)
 
     def why_outdated(self, folder: str, label: str) -> str | None:
-        """Return the reason that `outdated` has noted; None without a note."""
+        """Return the reason that `mark_outdated` has noted; None without a note."""
         table = read_checked(self._facts(folder, label, "failed")) if folder else None
         return None if table is None else str(table.get("why"))
 
@@ -246,7 +248,7 @@ class Store:
     def _facts(self, folder: str, label: str, suffix: str = "json") -> Path:
         return self.root / folder / ".facts" / f"{label.replace(' ', '.')}.{suffix}"
 
-    def last(self, folder: str, label: str) -> Record | None:
+    def last_shown(self, folder: str, label: str) -> Record | None:
         """Return the record of the artifact shown last, whatever its key; its files are not checked."""
         if not folder:
             return None
@@ -272,7 +274,7 @@ class Store:
         """Remove the temporary files and locks that killed processes left anywhere."""
         remove_leftovers(self.root)
 
-    def below(self, path: Path) -> str:
+    def shorten_path(self, path: Path) -> str:
         """Return a path in the form in which messages name it."""
         return str(path.relative_to(self.root.parent))
 
@@ -309,14 +311,14 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 def _write_content(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
     """Write a dataset as `write_dataset` does, without forcing its name to the disk."""
     from flexclear.artifacts import netcdf  # here, since commands with nothing to compute write nothing
-    from flexclear.artifacts.labelled import of
+    from flexclear.artifacts.labelled import label_dataset
 
-    data = of(dataset)
-    with temporary(path) as scratch:
+    data = label_dataset(dataset)
+    with temporary_name(path) as scratch:
         try:
             netcdf.write(scratch, data)
         except (OSError, RuntimeError) as error:
             # the HDF5 library does not report that the disk is full; writing plain bytes raises that error
             scratch.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
-        return settle(scratch, path)
+        return commit_file(scratch, path)

@@ -18,7 +18,7 @@ from flexclear.system.errors import InputError
 from flexclear.system.version import version
 from flexclear.workflow.program import exit_code
 
-#: verb -> its help. The module of the same name has `arguments(parser)` and `command(options)`
+#: verb -> its help. The module of the same name has `add_arguments(parser)` and `run_command(options)`
 COMMANDS = {
     "new": "write a commented scene to start from",
     "show": "draw the start pose with all names, in seconds, without a simulation",
@@ -49,7 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
     own = arguments is None  # True when this process is the command's own
 
     def work() -> int | None:
-        options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
+        options = build_parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
         if own:  # imported objects stay: they are garbage neither now nor at the end
             gc.freeze()
         code: int | None = options.command(options)
@@ -85,7 +85,7 @@ def require_command(name: str) -> None:
     raise InputError(name, "unknown command", suggestion(name, COMMANDS))
 
 
-def parser(arguments: list[str]) -> argparse.ArgumentParser:
+def build_parser(arguments: list[str]) -> argparse.ArgumentParser:
     """Return the parser of the command line: one sub-command per verb; only the requested verb's module is imported."""
     if arguments:
         require_command(arguments[0])
@@ -98,8 +98,8 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
         if asked:
             module = import_module(f"flexclear.commands.{verb}")
-            module.arguments(below)
-            below.set_defaults(command=module.command)
+            module.add_arguments(below)
+            below.set_defaults(command=module.run_command)
             top.options = [option for action in below._actions for option in action.option_strings]
     return top
 

@@ -27,7 +27,7 @@ DAYS = 30.0
 LISTED_FAULTS = 20
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     for name, text in ACTIONS.items():
@@ -36,7 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
             below.add_argument("what", metavar="FILE|KEY", help="a shown file, or a key or its beginning")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Run the requested action."""
     {"size": _print_size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
 
@@ -93,7 +93,7 @@ def _check(options: argparse.Namespace) -> None:
 
 def _explain(options: argparse.Namespace) -> None:
     store = open_workplace().store
-    record = maintenance.find(store, options.what)
+    record = maintenance.find_record(store, options.what)
     if record is None:
         raise InputError(options.what, "is neither a shown file nor the beginning of a single key", "see results/runs")
     print(f"{record.stage} {record.key}")
@@ -108,7 +108,7 @@ def _explain(options: argparse.Namespace) -> None:
 def _prune(options: argparse.Namespace) -> None:
     store = open_workplace().store
     inventory = maintenance.inventory(store, whole=True)
-    chosen = maintenance.prunable(store, inventory, DAYS * maintenance.DAY)
+    chosen = maintenance.list_prunable(store, inventory, DAYS * maintenance.DAY)
     broken = [a for a in inventory.artifacts if store.fault(a.record) is not None]
     chosen += [artifact for artifact in broken if artifact not in chosen]
     size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in inventory.orphans)

@@ -21,7 +21,7 @@ from flexclear.scene.load import RECIPE, SCENE, SWEEP, compose, is_file, kind_of
 from flexclear.scene.references import dangling_names
 from flexclear.scene.segments import body_frames, cut_segments
 from flexclear.scene.toml_files import read_toml
-from flexclear.scene.variants import ideal, replaceable_contacts
+from flexclear.scene.variants import ideal_scene, replaceable_contacts
 from flexclear.stages import meshing, modal_analysis, reduction, scenes, show, simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options, open_workplace
@@ -55,7 +55,7 @@ PLACING = ("[drive.", "[start.", "[gear.")
 LISTED_FRAMES = 3
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument(
         "scenes", nargs="+", metavar="SCENE", help="a scene, recipe or sweep file, or a name below scenes/"
@@ -66,7 +66,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "set", "json", "said")
 
 
-def command(options: argparse.Namespace) -> int:
+def run_command(options: argparse.Namespace) -> int:
     """Print all errors of all files; exit code 2 for errors, 4 where a file only asks for too much.
 
     Implausible values are warnings, which leave the exit code 0.
@@ -74,7 +74,7 @@ def command(options: argparse.Namespace) -> int:
     errors: dict[str, FlexclearError] = {}
     warnings: dict[str, InputError] = {}
     for name in options.scenes:
-        refused = _show(name, options.set, quiet=options.json) if options.show else None
+        refused = _draw_start(name, options.set, quiet=options.json) if options.show else None
         findings = examine(name, options.set, refused)
         errors |= {str(mistake): mistake for mistake in findings.errors}
         warnings |= {str(warning): warning for warning in findings.warnings}
@@ -93,7 +93,7 @@ def command(options: argparse.Namespace) -> int:
     return min((mistake.exit_code for mistake in errors.values()), default=0)
 
 
-def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | None:
+def _draw_start(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | None:
     """Write the start pose of a scene if it can be drawn; return the error that refuses it, or None."""
     try:
         if kind_of_file(read_toml(scenes.find_scene(name))) == SCENE:
@@ -127,7 +127,7 @@ class Findings:
     def records(self) -> list[dict[str, Any]]:
         """Return errors and warnings as tables: severity, file, line, place, problem, remedy."""
         found = (("error", self.errors), ("warning", self.warnings))
-        return [_record(mistake, severity) for severity, mistakes in found for mistake in mistakes]
+        return [_table_of_finding(mistake, severity) for severity, mistakes in found for mistake in mistakes]
 
 
 def examine(name: str, settings: Sequence[str] = (), refused: InputError | None = None) -> Findings:
@@ -144,7 +144,9 @@ def examine(name: str, settings: Sequence[str] = (), refused: InputError | None 
 
 def _examine(name: str, settings: Sequence[str], findings: Findings) -> None:
     path = scenes.find_scene(name)
-    {SCENE: _examine_scene, SWEEP: _sweep, RECIPE: _recipe}[kind_of_file(read_toml(path))](path, settings, findings)
+    {SCENE: _examine_scene, SWEEP: _check_sweep, RECIPE: _check_recipe}[kind_of_file(read_toml(path))](
+        path, settings, findings
+    )
 
 
 def _examine_scene(path: Path, settings: Sequence[str], findings: Findings) -> None:
@@ -163,7 +165,7 @@ def _examine_scene(path: Path, settings: Sequence[str], findings: Findings) -> N
             findings.attempt(partial(_check_reference, name, part), path)
         findings.attempt(partial(simulation.check_parts, simulation.params(scene)), path)
         if scene.sections is not None:
-            findings.attempt(partial(_sections, scene), path)
+            findings.attempt(partial(_check_sections, scene), path)
         unplaced = any(part in str(error) for error in findings.errors for part in PLACING)
         findings.warnings += scenes.implausibilities(scene, settings)
         findings.notes.append(scene.summary())
@@ -171,14 +173,14 @@ def _examine_scene(path: Path, settings: Sequence[str], findings: Findings) -> N
             compute(scene, mesh_of, findings)
 
 
-def _sections(scene: Scene) -> None:
+def _check_sections(scene: Scene) -> None:
     """Check the period of the sections, which a run ignores."""
     from flexclear.dynamics.model.checks import section_period
 
     section_period(scene)
 
 
-def _sweep(path: Path, settings: Sequence[str], findings: Findings) -> None:
+def _check_sweep(path: Path, settings: Sequence[str], findings: Findings) -> None:
     """Check a sweep file and its scene."""
     from flexclear.stages.sweeps import sweep_plan
     from flexclear.study import sweep
@@ -190,7 +192,7 @@ def _sweep(path: Path, settings: Sequence[str], findings: Findings) -> None:
     findings.notes = [f"a sweep over {', '.join(requested.vary)} of {scene.name}: {'; '.join(findings.notes)}"]
 
 
-def _recipe(path: Path, settings: Sequence[str], findings: Findings) -> None:
+def _check_recipe(path: Path, settings: Sequence[str], findings: Findings) -> None:
     """Check a recipe as a scene would use it, with the default limits of a scene."""
     body, of_mesh = body_of_recipe(path)
     findings.errors += of_mesh.errors
@@ -203,11 +205,11 @@ def _recipe(path: Path, settings: Sequence[str], findings: Findings) -> None:
     findings.notes.append(f"a mesh recipe, {table['shape']['type']}, frames: {frames}{mass}")
 
 
-def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
+def _table_of_finding(mistake: FlexclearError, severity: str) -> dict[str, Any]:
     record = {"severity": severity, "file": None, "line": None, "place": "", "problem": str(mistake), "remedy": None}
     if not isinstance(mistake, InputError):
         return record
-    location = toml_files.where(mistake)
+    location = toml_files.locate_error(mistake)
     file, line = (str(location[0]), location[1]) if location else (None, None)
     place = {"file": file, "line": line, "place": mistake.place}
     return {**record, **place, "problem": mistake.problem, "remedy": mistake.remedy}
@@ -272,14 +274,14 @@ def _mesh_recipe(path: Path, segment: tuple[int, int] | None, findings: Findings
         mesh = kind.build(table, path.parent, segment=segment)
     except InputError as error:
         raise meshing.in_recipe(error, path) from None
-    findings.warnings += _unit(mesh, table, path)
+    findings.warnings += _unit_warnings(mesh, table, path)
     if 3 * mesh.sizes.get("node", 0) > LARGEST_MESH:
         return
     model = kind.of_mesh(mesh).assemble(mesh)
     yield Body(mesh, model, bundle.rigid_of(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
 
 
-def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[InputError]:
+def _unit_warnings(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[InputError]:
     """Yield a warning for a mesh from a file whose size suggests another unit of length; files do not state theirs."""
     import numpy as np
 
@@ -333,16 +335,16 @@ def _check_assembly(whole: Scene, bodies: Mapping[str, Body], findings: Findings
     sound = findings.attempt(lambda: refuse(mechanism_errors(whole, mechanism)), whole.path)
     moving: list[tuple[Model, Mobility]] = []
     if mechanism.all_rigid and sound:
-        moving = [_movable(mechanism)]
+        moving = [_model_and_mobility(mechanism)]
         mechanism = moving[0][0].mechanism
     else:
         mechanism = assemble(mechanism)
     refuse(start_errors(mechanism, final=whole.start is None or whole.start.at != "equilibrium"))
     reduced = _reduce_bodies(whole, bodies) if sound else None
-    moving = [_movable(_mechanism(whole, bodies, reduced))] if reduced else moving
+    moving = [_model_and_mobility(_mechanism(whole, bodies, reduced))] if reduced else moving
     for known in (one for one in moving if one[0].nv <= MOST_COORDINATES):
         for check in start_refusals(_fill_in_recipes(whole, bodies), reduced or {}, *known):
-            findings.attempt(_as_mistakes()(check), whole.path)
+            findings.attempt(_convert_start_errors()(check), whole.path)
     if not _starts_ideal(whole):
         _note_choice(whole, mechanism, findings)
     for place, text, remedy in doubts(mechanism):
@@ -353,7 +355,7 @@ def _check_assembly(whole: Scene, bodies: Mapping[str, Body], findings: Findings
         findings.notes.append(f"unused frames: {', '.join(unused[:LISTED_FRAMES])}{more}")
 
 
-def _movable(mechanism: Mechanism) -> tuple[Model, Mobility]:
+def _model_and_mobility(mechanism: Mechanism) -> tuple[Model, Mobility]:
     """Return the model of a mechanism and how it can move; raise InputError where it cannot."""
     from flexclear.dynamics.model.mobility import analyse
     from flexclear.dynamics.model.model import tabulate
@@ -361,7 +363,7 @@ def _movable(mechanism: Mechanism) -> tuple[Model, Mobility]:
 
     model = tabulate(mechanism)
     mobility = analyse(model)
-    with _as_mistakes():
+    with _convert_start_errors():
         refuse_singular(model, mobility)
     return model, mobility
 
@@ -373,27 +375,27 @@ def _reduce_bodies(whole: Scene, bodies: Mapping[str, Body]) -> dict[str, xr.Dat
     for name, part in whole.flexible().items():
         mesh, requested = bodies[name].mesh, reduction.params(whole, name)
         if bodies[name].model.size <= MOST_REDUCED:
-            with _errors_in_body(name, part), _as_mistakes():
+            with _errors_in_body(name, part), _convert_start_errors():
                 modes = modal_analysis.run(modal_analysis.params(part), {"mesh": mesh}, silent)["nc"]
             reduced[name] = reduction.run(requested, {"mesh": mesh, "modes": modes}, silent)["nc"]
-        elif found := _stored(Graph(whole).bundle[name]):
+        elif found := _stored_dataset(Graph(whole).bundle[name]):
             reduced[name] = found
         else:
             return None
     return reduced
 
 
-def _stored(task: Task) -> xr.Dataset | None:
+def _stored_dataset(task: Task) -> xr.Dataset | None:
     """Return the main file of a task's artifact where that is up to date."""
     place = open_workplace()
-    if place.store.last(task.folder, task.label) is None:
+    if place.store.last_shown(task.folder, task.label) is None:
         return None
     record = states([task], place.store, place.sources)[-1].record
     return None if record is None else place.store.load(record)
 
 
 @contextmanager
-def _as_mistakes() -> Iterator[None]:
+def _convert_start_errors() -> Iterator[None]:
     """Turn errors that the run would meet at its start into errors of the scene."""
     try:
         yield
@@ -438,7 +440,7 @@ def _free_motions(whole: Scene, bodies: Mapping[str, Body], findings: Findings) 
 
     idealised = bool(replaceable_contacts(whole) or whole.flexible())
     try:
-        model = tabulate(_mechanism(ideal(whole) if idealised else whole, bodies))
+        model = tabulate(_mechanism(ideal_scene(whole) if idealised else whole, bodies))
         free = analyse(model).mobility
     except InputError:  # the mechanism moves only with flexible bodies or with clearance
         return

@@ -19,13 +19,13 @@ from flexclear.stages.meshing import kind_of
 from flexclear.stages.workplace import add_options
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
     add_options(parser, "set", "said")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Print the sources of a scene."""
     (graph,) = scenes.graphs([options.scene], options.set)
     print(text(graph.scene), end="")
@@ -48,13 +48,13 @@ def methods(scene: Scene) -> Iterator[tuple[str, str, bool]]:
     uses = Uses(with_switched(scene) if scene.event else scene)
     for path in sorted(PACKAGE.rglob("*.py")):
         tower, *inside = path.relative_to(PACKAGE).with_suffix("").parts
-        always = uses.always(".".join(inside)) if tower == "dynamics" else _of_bodies(scene, tower, inside) or None
+        always = uses.always(".".join(inside)) if tower == "dynamics" else _bodies_need(scene, tower, inside) or None
         if always is not None:
             for source in dict.fromkeys(sources(path)):
                 yield ".".join(("flexclear", tower, *inside)), source, always
 
 
-def _of_bodies(scene: Scene, tower: str, inside: list[str]) -> bool:
+def _bodies_need(scene: Scene, tower: str, inside: list[str]) -> bool:
     """Return True for a module that the flexible bodies of a scene use."""
     kinds = {kind_of(Path(body.mesh)) for body in scene.flexible().values()}
     stressed = "stress" not in inside or bool(scene.output.stress)

@@ -11,7 +11,7 @@ from flexclear.stages.workplace import open_workplace
 from flexclear.study.compare import IDEAL, TABLES, compare_scenes
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scene_arguments(parser, "json")
     parser.add_argument(
@@ -25,7 +25,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Bring the comparison up to date, print its tables and where its files are."""
     workplace = open_workplace(options)
     made = compare_scenes([graph.scene for graph in graphs(options.scenes, options.set)], workplace, options.ideal)

@@ -25,20 +25,22 @@ complete -o filenames -F _flexclear flexclear
 SHELLS = {"bash": BASH, "zsh": "autoload -U +X bashcompinit && bashcompinit\n" + BASH}
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument(
         "shell", choices=SHELLS, metavar="SHELL", help='bash or zsh; for example: eval "$(flexclear completion bash)"'
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Print the completion code of a shell."""
-    from flexclear.commands.__main__ import COMMANDS, parser
+    from flexclear.commands.__main__ import COMMANDS, build_parser
 
     cases = []
     for verb in COMMANDS:
-        (verbs,) = (action for action in parser([verb])._actions if isinstance(action, argparse._SubParsersAction))
+        (verbs,) = (
+            action for action in build_parser([verb])._actions if isinstance(action, argparse._SubParsersAction)
+        )
         known = [name for action in verbs.choices[verb]._actions for name in action.option_strings]
         cases.append(f'        {verb}) options="{" ".join(known)}" ;;')
     print(SHELLS[options.shell].format(verbs=" ".join(COMMANDS), cases="\n".join(cases)), end="")

@@ -10,7 +10,7 @@ from flexclear.stages.workplace import Made, open_workplace, relative, seconds
 from flexclear.study.cost import BUDGET, TABLE, measure_costs
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
     parser.add_argument(
@@ -18,7 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Bring the studies up to date and print their tables."""
     workplace, studies = open_workplace(options), {}
     budget = seconds(options.budget, "--budget")

@@ -79,8 +79,6 @@ print(float(result.position.sel(body="ball", axis="z")[-1]))
 """
 #: templates with the kinds of parts that most mechanisms have
 USUAL = ("pendulum", "four-bar", "slider-crank", "leg")
-#: largest error [m]; the integration is exact to its tolerance of 1e-10
-CLOSE = 1e-9
 
 
 class UnwellError(FlexclearError):
@@ -89,7 +87,7 @@ class UnwellError(FlexclearError):
     exit_code = 4
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     either = parser.add_mutually_exclusive_group()
     either.add_argument("--bundle", metavar="SCENE", help="run a scene, and write all that repeats it into one file")
@@ -104,7 +102,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE.zip", help="file that --bundle writes")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Print the findings line by line; raise UnwellError at the end when something is wrong."""
     if options.out is not None:
         if options.bundle is None:
@@ -146,7 +144,7 @@ def findings() -> Iterator[tuple[str, str, bool | None]]:
     versions = {name: library_version(name) for name in (*LIBRARIES, *OPTIONAL)}
     missing = [name for name in LIBRARIES if versions[name] == "absent"]
     yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), not missing
-    yield "memory", f"{machine.size(machine.memory())} free", machine.memory() > LITTLE_MEMORY
+    yield "memory", f"{machine.size_text(machine.available_memory())} free", machine.available_memory() > LITTLE_MEMORY
     yield "results", *_describe_results(results_root())
     yield "kernels", *_describe_kernels()
     yield "graphics", *_describe_graphics()
@@ -155,11 +153,11 @@ def findings() -> Iterator[tuple[str, str, bool | None]]:
 
 def _describe_results(root: Path) -> tuple[str, bool]:
     """Return the folder of results with its free space and obstacles to writing, and True without obstacles."""
-    free = machine.disk(root)
-    wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
+    free = machine.free_disk_space(root)
+    wrong = [f"less than {machine.size_text(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
     if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):
         wrong.append("the folder is not writable: set FLEXCLEAR_RESULTS to another")
-    return "; ".join([f"{root}, {machine.size(free)} free", *wrong]), not wrong
+    return "; ".join([f"{root}, {machine.size_text(free)} free", *wrong]), not wrong
 
 
 def _describe_kernels() -> tuple[str, bool]:
@@ -171,16 +169,20 @@ def _describe_kernels() -> tuple[str, bool]:
     if messages:
         return f"{messages[0]}: set FLEXCLEAR_KERNELS to another folder", False
     text = f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled"
-    if machine.disk(folder) < LITTLE_FOR_KERNELS:
-        return f"{text}; only {machine.size(machine.disk(folder))} free: set FLEXCLEAR_KERNELS to another folder", False
+    if machine.free_disk_space(folder) < LITTLE_FOR_KERNELS:
+        return (
+            f"{text}; only {machine.size_text(machine.free_disk_space(folder))} free: "
+            "set FLEXCLEAR_KERNELS to another folder",
+            False,
+        )
     return text, True
 
 
 def _describe_graphics() -> tuple[str, bool | None]:
     """Draw something, since libraries that load may still fail; without them only pictures of shapes are lacking."""
-    if gl.works():
-        return f"{gl.state()}; a picture was drawn", True
-    return f"{gl.state()}; nothing can be drawn: {gl.remedy()}", None
+    if gl.can_draw():
+        return f"{gl.library_state()}; a picture was drawn", True
+    return f"{gl.library_state()}; nothing can be drawn: {gl.remedy()}", None
 
 
 def _self_test() -> tuple[str, bool]:
@@ -207,7 +209,8 @@ def _self_test() -> tuple[str, bool]:
         # users need only the last line of a traceback
         last_lines = errors[-1:] if any(line.startswith("Traceback") for line in errors) else errors[-4:]
         return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
-    fine = abs(float(lines[-1]) - expected) < CLOSE
+    # 1e-9: largest error [m]; the integration is exact to its tolerance of 1e-10
+    fine = abs(float(lines[-1]) - expected) < 1e-9
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m instead of {expected:.12g} m", fine
 
 

@@ -9,7 +9,7 @@ from flexclear.stages import formats, scenes
 from flexclear.stages.workplace import add_options, open_workplace
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
     parser.add_argument("--format", required=True, metavar="FORMAT", help=", ".join(formats.FORMATS))
@@ -24,7 +24,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "usual")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Write the file and print what it holds."""
     (graph,) = scenes.graphs([options.scene], options.set)
     given = {"at": scenes.moment(options.at), "held": options.held or None, "body": options.body, "fmi": options.fmi}

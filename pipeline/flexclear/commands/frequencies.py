@@ -29,7 +29,7 @@ MOST_SPEEDS = 10_000
 PICTURES = (".png", ".svg")
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
     parser.add_argument(
@@ -56,7 +56,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "usual", "json")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Print the table of frequencies, or of a Campbell diagram with `--speeds`."""
     (graph,) = scenes.graphs([options.scene], options.set)
     time = scenes.moment(options.at)
@@ -67,7 +67,7 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--drive", "belongs to a Campbell diagram", "add --speeds, e.g. 0:500rpm:50")
     if any(target.suffix in PICTURES for target in options.out or ()):
         raise InputError("--out", "pictures are of Campbell diagrams", "add --speeds, e.g. 0:500rpm:50")
-    targets = _targets(options, ())
+    targets = _output_files(options, ())
     modes = scenes.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
     print(as_json(modes) if options.json else text(modes).rstrip("\n"))
     for target in targets:
@@ -75,7 +75,7 @@ def command(options: argparse.Namespace) -> None:
             export.write(modes, target, ("vibration",))
 
 
-def _targets(options: argparse.Namespace, pictures: Sequence[str]) -> list[Path]:
+def _output_files(options: argparse.Namespace, pictures: Sequence[str]) -> list[Path]:
     """Return the files of `--out`, checked before the work; pictures: endings besides those of datasets."""
     targets: list[Path] = options.out or []
     for target in targets:
@@ -85,8 +85,8 @@ def _targets(options: argparse.Namespace, pictures: Sequence[str]) -> list[Path]
 
 def print_diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> None:
     """Print the table of a Campbell diagram, and write its dataset and its picture."""
-    given = speeds(options.speeds)
-    targets = _targets(options, PICTURES)
+    given = parse_speeds(options.speeds)
+    targets = _output_files(options, PICTURES)
     made = scenes.linear(scene, time, speeds=given, drive=options.drive, workplace=open_workplace(options))
     from flexclear.post.plotting import campbell
 
@@ -100,7 +100,7 @@ def print_diagram(scene: Scene, time: float | None, options: argparse.Namespace)
                 export.write(made, target, ("speed",))
 
 
-def speeds(text: str) -> list[float]:
+def parse_speeds(text: str) -> list[float]:
     """Parse FIRST:LAST:STEP into speeds [rad/s], the last included; one unit serves all three. Raises InputError."""
     parts = [part.strip() for part in text.split(":")]
     rule = "takes FIRST:LAST:STEP, the step positive and the last speed above the first"
@@ -130,7 +130,7 @@ def text(linear: xr.Dataset) -> str:
         f"{a['scene']} at t = {a['time']:.6g} s, drives {a['drives']}",
         *_pose(linear),
         f"equilibrium: largest unbalanced force {a['residual']:.3g} N after {a['iterations']} iterations",
-        *_freedoms(linear),
+        *_mobility_lines(linear),
     ]
     if linear.sizes["vibration"]:
         grows = a["growth"]
@@ -154,7 +154,7 @@ def text(linear: xr.Dataset) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _freedoms(linear: xr.Dataset) -> list[str]:
+def _mobility_lines(linear: xr.Dataset) -> list[str]:
     """Return lines on mobility: free motions, those without stiffness, and closure rows that follow from others."""
     limp, repeated = linear.attrs["motions_without_stiffness"], linear.attrs["redundant_closure_rows"]
     lines = [

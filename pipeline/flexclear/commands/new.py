@@ -11,7 +11,7 @@ from flexclear.stages.new_scene import TEMPLATES as TEMPLATES
 from flexclear.system.errors import InputError
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     message = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
     parser.add_argument("kind", nargs="?", metavar="KIND", help=message)
@@ -27,7 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", type=Path, dest="source", metavar="FILE", help=message)
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Write the files and print the next commands."""
     lost: list[str] = []
     if options.source is not None:  # KIND is then the folder

@@ -11,7 +11,7 @@ from flexclear.stages.workplace import open_workplace, seconds
 from flexclear.study.plan import BUDGET, LEVEL, make_plan, verify
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
     parser.add_argument("--out", type=Path, metavar="FILE.toml", help="also write the planned scene here (one scene)")
@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Plan scenes, print the decisions and the planned scenes' files; with `--verify` print their true errors."""
     scenes.check_out(options.out, options.scenes, endings=(".toml",))
     workplace = open_workplace(options)

@@ -13,7 +13,7 @@ from flexclear.system.errors import InputError
 from flexclear.workflow.task import Task
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
     parser.add_argument(
@@ -34,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Bring the pictures up to date and print where they are."""
     requested = _subject_and_format(options.what, options.format)
     if options.at is not None and options.what != "vibrations":

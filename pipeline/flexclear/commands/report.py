@@ -12,7 +12,7 @@ from flexclear.stages.workplace import Workplace, add_options, open_workplace, r
 from flexclear.study.report import write_report
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
     parser.add_argument(
@@ -27,7 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "usual", "budget", "json")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Bring the reports up to date and print where they are."""
     workplace = open_workplace(options)
     pages: dict[str, str] = {}

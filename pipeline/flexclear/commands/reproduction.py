@@ -21,7 +21,7 @@ from flexclear.scene.toml_files import read_toml
 from flexclear.stages import meshing, scenes
 from flexclear.stages.sweeps.sweep_points import source_digest
 from flexclear.system.errors import FlexclearError, InputError
-from flexclear.system.external_files import companions, require_file
+from flexclear.system.external_files import companion_files, require_file
 from flexclear.system.version import version
 from flexclear.workflow.fingerprint import library_version
 
@@ -29,12 +29,8 @@ from flexclear.workflow.fingerprint import library_version
 FACTS, LOG, FILES = "facts.json", "log.txt", "files"
 #: largest size of the unpacked file [bytes], and length of a stored log [characters]
 LARGEST_UNPACKED, LONGEST_LOG = 1 << 30, 200_000
-#: last lines of each log that are shown
-REPORTED = 5
 #: variables of the environment that change results, or where they are stored
 VARIABLES = ("FLEXCLEAR_", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_")
-#: no date: equal content gives equal bytes
-DATE = (1980, 1, 1, 0, 0, 0)
 
 
 def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: Path | None) -> tuple[Path, list[Path]]:
@@ -99,7 +95,8 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
     here = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
     recorded = {**facts["libraries"], "python": facts["python"]}
     differences += [f"{k} is {here[k]} here, {v} there" for k, v in sorted(recorded.items()) if here.get(k, v) != v]
-    ending = [text.strip().splitlines()[-REPORTED:] for text in (log, output)]
+    # 5: last lines of each log that are shown
+    ending = [text.strip().splitlines()[-5:] for text in (log, output)]
     differences += [
         f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines
     ]
@@ -129,7 +126,7 @@ def _files_of_scene(scene: Path, settings: Sequence[str]) -> tuple[dict[Path, bo
             others += meshing.named_files(read_toml(path), path.parent)
     for path in list(others):
         with contextlib.suppress(FlexclearError):
-            others.extend(companions(path))
+            others.extend(companion_files(path))
     opened = dict.fromkeys((path.resolve() for path in others if is_file(path)), False)
     opened |= dict.fromkeys((path.resolve() for path in texts + recipes if is_file(path)), True)
     folders = (scene.parent, *((DATA / name).resolve() for name in ("scenes", "meshes")))
@@ -202,7 +199,8 @@ def _zip_files(content: Mapping[str, bytes]) -> bytes:
     with tempfile.TemporaryFile() as file:
         with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, data in content.items():
-                archive.writestr(zipfile.ZipInfo(name, DATE), data, zipfile.ZIP_DEFLATED)
+                # (1980, 1, 1, 0, 0, 0): no date: equal content gives equal bytes
+                archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data, zipfile.ZIP_DEFLATED)
         file.seek(0)
         return file.read()
 

@@ -26,7 +26,7 @@ from flexclear.system.errors import InputError
 from flexclear.workflow.schedule import Outcome
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scene_arguments(parser, "json")
     parser.add_argument(
@@ -44,7 +44,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Bring scenes up to date; print the deficits of their bundles where those are the last stage."""
     check_out(options.out, options.scenes)
     if options.verify and not options.planned:

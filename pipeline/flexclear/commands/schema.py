@@ -8,14 +8,14 @@ import json
 KINDS = ("scene", "recipe", "sweep")
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument(
         "kind", nargs="?", choices=KINDS, default="scene", metavar="KIND", help="scene (default), recipe or sweep"
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Print the JSON schema of a kind of file."""
     if options.kind == "scene":
         from flexclear.scene.json_schema import scene_schema as schema

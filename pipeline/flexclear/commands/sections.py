@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="also write the verdicts as a page")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Print the verdict on each scene."""
     if options.page is not None:
         scenes.check_target(options.page, "--page")

@@ -13,7 +13,7 @@ from flexclear.stages.workplace import open_workplace
 from flexclear.system.errors import InputError
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
     parser.add_argument(
@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> int:
+def run_command(options: argparse.Namespace) -> int:
     """Write the picture and the page of each scene to the current folder.
 
     Exit code 2 where a start does not fit; it is shown all the same.

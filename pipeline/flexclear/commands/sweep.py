@@ -18,7 +18,7 @@ from flexclear.study.sweep import NAME, read, run_sweep, summary, width
 from flexclear.system.errors import InputError, SolverError
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument("sweeps", nargs="+", metavar="SWEEP", help="a sweep file, or a name below scenes/")
     add_options(parser, "usual", "json")
@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Bring sweeps up to date: dataset and figures below results/sweeps, a summary on the screen."""
     if options.out is not None and len(options.sweeps) == 1 and options.out.suffix == sweep_large.SUFFIX:
         sweep_large.require_zarr(f"--out {options.out}")

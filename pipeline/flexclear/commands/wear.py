@@ -22,7 +22,7 @@ COLUMNS = (
 )
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
     parser.add_argument("--cycles", type=float, required=True, metavar="N", help="number of cycles, such as 1e6")
@@ -36,7 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Bring the wear of each scene up to date, and print it."""
     workplace, worn = open_workplace(options), {}
     for graph in scenes.graphs(options.scenes, options.set):

@@ -15,13 +15,13 @@ from flexclear.system.machine import instruction_set
 from flexclear.workflow.execute import states
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     scenes.scene_arguments(parser, "json")
     parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
     workplace, reasons, others = open_workplace(options), dict[str, dict[str, list[str]]](), dict[str, list[str]]()
     for graph in scenes.graphs(options.scenes, options.set):

@@ -87,14 +87,14 @@ def start_refusals(
     if not found:
         return
     from flexclear.dynamics.events.phases import require_false
-    from flexclear.dynamics.record.sections import repeated
+    from flexclear.dynamics.record.sections import engines_of_period
     from flexclear.dynamics.run.inverse import enough
 
     yield lambda: enough(*found)
     if scene.event and (at is None or not afar):
         yield lambda: require_false(scene, *found)
     if scene.sections is not None:
-        yield lambda: repeated(*found)
+        yield lambda: engines_of_period(*found)
 
 
 def equilibrium(
@@ -153,7 +153,7 @@ def state_space(
     from flexclear.dynamics.linear.bench import hold, state
     from flexclear.dynamics.linear.equilibrium import bench_in_equilibrium, newton
     from flexclear.dynamics.linear.state_space import require_continuous, state_space
-    from flexclear.dynamics.starts.snapshot import released, with_poses
+    from flexclear.dynamics.starts.snapshot import with_forces_for_drives, with_poses
 
     require_continuous(scene)
     bench, rest, _ = bench_in_equilibrium(scene, bundles, progress, time, drives)
@@ -162,7 +162,7 @@ def state_space(
         forces = dataset.equilibrium(bench, rest, moving=False)["drive_force"]
         given = {name: float(forces.sel(drive=name)) for name in moved}
         still = with_poses(scene, bench.engine, state(bench, rest.at.q), bench.time)
-        bench, q = hold(released(still, given), bundles, progress, bench.time, {}, moving=False)
+        bench, q = hold(with_forces_for_drives(still, given), bundles, progress, bench.time, {}, moving=False)
         rest = newton(bench, q)
     owners = bench.scene.owners()
     return state_space(bench, rest, [q for q in outputs if q.over_time and q.is_there(owners)])

@@ -30,7 +30,7 @@ def length(levels: Sequence[int]) -> int:
 
 def numbers(table: LookupTable) -> list[float]:
     """Return the numbers of a table, as they are read."""
-    axes, sizes = [np.array(axis) for axis in table.axes()], [2**n for n in table.levels()]
+    axes, sizes = [np.array(axis) for axis in table.axes()], [2**n for n in table.halvings()]
     values = np.array(sorted(table.points))[:, -1].reshape([len(axis) for axis in axes])
     # coefficients of the pieces along each quantity in turn, ascending: (interval, power) in place of its values
     for k, axis in enumerate(axes):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from flexclear.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.artifacts.schema import mark_incomplete
-from flexclear.dynamics.record.dataset import recorded, warnings
+from flexclear.dynamics.record.dataset import record_run, warnings
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.progress_rate import Judges
 from flexclear.dynamics.run.run import Run, RunInParts
@@ -33,7 +33,7 @@ class SingleRun:
         if scene.event:
             from flexclear.dynamics.events import phases  # here, since it imports SciPy
 
-            self._run = phases.simulated(scene, bundles, progress, judges)
+            self._run = phases.run_with_events(scene, bundles, progress, judges)
         else:
             self._run = RunInParts(scene, bundles, progress, judges, known)
 
@@ -60,5 +60,5 @@ class SingleRun:
 
     def _recorded(self, done: Run) -> LabelledArrays:
         if done.stopped:
-            raise stopping.error(done.stopped, mark_incomplete(recorded(done), done.stopped))
-        return recorded(done)
+            raise stopping.stopping_error(done.stopped, mark_incomplete(record_run(done), done.stopped))
+        return record_run(done)

@@ -76,7 +76,7 @@ def box(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 SMALL = 1e-6
 
 
-def hertz(frequency: float) -> str:
+def format_frequency(frequency: float) -> str:
     """Format a frequency."""
     return "static" if not frequency > 0.0 else f"{frequency:.5g} Hz"
 
@@ -94,7 +94,7 @@ def linear_fields(bundle: xr.Dataset) -> np.ndarray:
     return fields_of(bundle)[1] - centre.T[:, None, :]
 
 
-def stress_recorded(run: xr.Dataset) -> list[str]:
+def bodies_with_stress(run: xr.Dataset) -> list[str]:
     """Return the bodies whose stress a run records."""
     return list(dict.fromkeys(map(str, run["gauge_body"].values))) if "von_mises_stress" in run else []
 

@@ -69,11 +69,11 @@ class PathDrive(Part):
                 yield f"{kind}.{axis}", law
 
 
-def _which(data: Any) -> str:
+def _drive_tag(data: Any) -> str:
     frame = "frame" in data if isinstance(data, dict) else isinstance(data, PathDrive)
     return "path-drive" if frame else "joint-drive"
 
 
 Drive = Annotated[
-    Annotated[JointDrive, Tag("joint-drive")] | Annotated[PathDrive, Tag("path-drive")], Discriminator(_which)
+    Annotated[JointDrive, Tag("joint-drive")] | Annotated[PathDrive, Tag("path-drive")], Discriminator(_drive_tag)
 ]

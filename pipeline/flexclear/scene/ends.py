@@ -32,7 +32,7 @@ class Stop(OnCoordinate):
     start is refused, unless it is an equilibrium"""
 
     @model_validator(mode="after")
-    def _complete(self) -> Self:
+    def _require_an_end(self) -> Self:
         if self.lower is None and self.upper is None:
             raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
         if self.ratio is not None and self.relative_to is None:

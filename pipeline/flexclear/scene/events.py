@@ -15,7 +15,7 @@ from flexclear.scene.formulas import formula
 from flexclear.scene.loads import Load, SampledPid
 from flexclear.scene.loose_joints import CONTACTS
 from flexclear.scene.owners import COORDINATES
-from flexclear.scene.quantity import condition
+from flexclear.scene.quantity import parse_condition
 from flexclear.scene.registry import suggestion
 from flexclear.scene.units import quantity
 
@@ -155,7 +155,7 @@ def _problems(scene: Any, name: str, event: Event) -> Iterator[tuple[str, str]]:
             yield "at", f"{event.at:g} s is not within the run, {scene.time.start:g} to {scene.time.end:g} s"
         return
     try:
-        condition(str(event.at), scene.owners())
+        parse_condition(str(event.at), scene.owners())
     except ValueError as error:
         yield "at", str(error)
 

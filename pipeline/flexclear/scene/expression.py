@@ -132,8 +132,8 @@ def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) ->
     if exponents is not None and not _same_units(exponents, needed):
         turned = "; rad is a unit: divide by 1 rad" if _same_units((*exponents[:3], 0.0), needed) else ""
         raise ValueError(
-            f"its value is in {units.si(exponents)}, but {units.with_article(dimension)} [{units.si(needed)}] is "
-            f"expected{turned}"
+            f"its value is in {units.si_unit(exponents)}, but {units.with_article(dimension)} "
+            f"[{units.si_unit(needed)}] is expected{turned}"
         )
 
 
@@ -148,7 +148,7 @@ def _measure_of_operation(operator: Any, operands: list[Measure]) -> Measure:
     if isinstance(operator, Lookup):
         for unit, (exponents, dim, _) in zip(operator.of, operands, strict=True):
             if dim or (exponents is not None and not _same_units(exponents, units.unit_exponents(unit))):
-                given = "a vector" if dim or exponents is None else f"a value in {units.si(exponents)}"
+                given = "a vector" if dim or exponents is None else f"a value in {units.si_unit(exponents)}"
                 raise ValueError(f"table({operator.name}, ...) is over a value in {unit}, not {given}")
         return units.unit_exponents(operator.value), "", None
     (a, first, _), (b, second, number) = operands[0], operands[-1]
@@ -164,7 +164,7 @@ def _measure_of_operation(operator: Any, operands: list[Measure]) -> Measure:
     if operator in "+-" or operator in SEVERAL:
         if a is not None and b is not None and not _same_units(a, b):
             verb = "added or subtracted" if operator in "+-" else "compared"
-            raise ValueError(f"{units.si(a)} and {units.si(b)} cannot be {verb}; give numbers their unit")
+            raise ValueError(f"{units.si_unit(a)} and {units.si_unit(b)} cannot be {verb}; give numbers their unit")
         if first != second:
             raise ValueError("a vector and a number cannot be added or subtracted; take a component, or norm(...)")
         if not first or operator in "+-":
@@ -182,7 +182,8 @@ def _measure_of_operation(operator: Any, operands: list[Measure]) -> Measure:
     takes = {"exp": (NUMBER,), "log": (NUMBER,)}.get(operator, (NUMBER, ANGLE))
     if operator not in ("sign", "step") and a is not None and not any(_same_units(a, one) for one in takes):
         raise ValueError(
-            f"{operator}(...) takes a number{' or an angle' if ANGLE in takes else ''}, not a value in {units.si(a)}"
+            f"{operator}(...) takes a number{' or an angle' if ANGLE in takes else ''}, "
+            f"not a value in {units.si_unit(a)}"
         )
     return NUMBER, "", None
 
@@ -268,7 +269,9 @@ def _as_python(text: str) -> tuple[list[str], list[re.Match[str]]]:
 def _leaf(token: re.Match[str], term: Callable[[str], Any], constants: Mapping[str, tuple[float, str]]) -> Any:
     if token["number"]:
         written = token["unit"]
-        factor, unit = (units.UNITS[written][0], units.si(units.unit_exponents(written))) if written else (1.0, "1")
+        factor, unit = (
+            (units.UNITS[written][0], units.si_unit(units.unit_exponents(written))) if written else (1.0, "1")
+        )
         value = factor * float(token["number"])
         if not math.isfinite(value):
             raise ValueError(f"{token[0].strip()} is too large: the largest number is 1.8e308")

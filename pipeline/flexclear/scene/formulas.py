@@ -167,7 +167,7 @@ def _encode(
 
     def apply(operator: Any, operands: list[str]) -> str:
         if isinstance(operator, Lookup):
-            levels = "".join(f":{one}" for one in tables[operator.name].levels())
+            levels = "".join(f":{one}" for one in tables[operator.name].halvings())
             return " ".join([*operands, f"T{list(tables).index(operator.name)}{levels}"])
         exponent = numbers[-1] if operator == "^" else 0.5
         if exponent == int(exponent) and 0 < abs(exponent) <= WHOLE:

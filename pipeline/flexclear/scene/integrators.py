@@ -21,7 +21,7 @@ TO_1E_9, TO_1E_13 = (tuple(10.0**-k for k in range(3, last + 1)) for last in (9,
 STEPS = (1e-4, 3e-5, 1e-5, 3e-6)
 
 
-def by_need(flexible: bool) -> tuple[str, ...]:
+def selectable_integrators(flexible: bool) -> tuple[str, ...]:
     """Return the integrators among which the program chooses where a scene requests an accuracy only."""
     return (DEFAULT, *((VIBRATING,) if flexible else ()), STIFF)
 

@@ -48,14 +48,14 @@ class _Law(Part):
     @property
     def functions(self) -> Functions:
         """Each table as a function of its variables, with the halvings of its axes."""
-        return tuple((one.function(name), one.levels()) for name, one in self.tables.items())
+        return tuple((one.function(name), one.halvings()) for name, one in self.tables.items())
 
 
-def encoded(
+def encode_law(
     text: str, values: Mapping[str, Any], variables: Mapping[str, Local], tables: Functions = ()
 ) -> tuple[str, tuple[float, ...]]:
     """Return structure and values of an expression, whose units `check` checks; raise ValueError for no expression."""
-    return _encoded(text, tuple(values.items()), tuple(variables.items()), tables)[:2]
+    return _encode_law(text, tuple(values.items()), tuple(variables.items()), tables)[:2]
 
 
 def check(
@@ -68,7 +68,7 @@ def check(
 ) -> None:
     """Raise ValueError, in words, for an expression without meaning or of another dimension than its law."""
     try:
-        _, numbers, steps = _encoded(text, tuple(values.items()), tuple(variables.items()), tables)
+        _, numbers, steps = _encode_law(text, tuple(values.items()), tuple(variables.items()), tables)
         check_unit(steps, dimension)
     except ValueError as error:
         raise ValueError(f"{key} = '{text}': {error}") from None
@@ -78,7 +78,7 @@ def check(
 
 
 @lru_cache(maxsize=256)
-def _encoded(
+def _encode_law(
     text: str, given: tuple[tuple[str, Any], ...], variables: tuple[tuple[str, Local], ...], tables: Functions
 ) -> tuple[str, tuple[float, ...], tuple[Any, ...]]:
     known = dict(variables)
@@ -137,8 +137,8 @@ class NormalExpression(_Law):
 
     @property
     def encoded(self) -> tuple[str, tuple[float, ...]]:
-        """Structure and values of the expression (`encoded`)."""
-        return encoded(self.force, self.named, NORMAL, self.functions)
+        """Structure and values of the expression (`encode_law`)."""
+        return encode_law(self.force, self.named, NORMAL, self.functions)
 
     @property
     def kind(self) -> str:
@@ -160,8 +160,8 @@ class FrictionExpression(_Law):
 
     @property
     def encoded(self) -> tuple[str, tuple[float, ...]]:
-        """Structure and values of the expression (`encoded`)."""
-        return encoded(self.coefficient, self.values, SLIDING, self.functions)
+        """Structure and values of the expression (`encode_law`)."""
+        return encode_law(self.coefficient, self.values, SLIDING, self.functions)
 
     @property
     def kind(self) -> str:

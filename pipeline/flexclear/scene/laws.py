@@ -153,7 +153,7 @@ class Column(Part):
 
     @field_validator("unit")
     @classmethod
-    def _known(cls, text: str) -> str:
+    def _require_known_unit(cls, text: str) -> str:
         if text != "1" and unit(text) is None:
             raise ValueError(f"{unknown_unit_message(text)}; 1 is the unit of a number")
         return text
@@ -300,12 +300,12 @@ Law = Annotated[
 KINDS: tuple[Any, ...] = get_args(get_args(Law)[0])
 
 
-def _bare(law: Any) -> Any:
+def _constant_law(law: Any) -> Any:
     """Return a bare value as a constant law."""
     return law if not isinstance(law, (int, float, str)) else {"type": "constant", "value": law}
 
 
-Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float | str)]
+Bare = Annotated[Law, BeforeValidator(_constant_law, json_schema_input_type=Law | float | str)]
 
 
 def _count(law: Any) -> int:

@@ -52,7 +52,7 @@ class Limits(Part):
         """The message when the time is over."""
         return f"the run reached the {self.time or 0.0:.6g} s of limits.time"
 
-    def written(self) -> dict[str, Any]:
+    def as_table(self) -> dict[str, Any]:
         """Return the limits as a table that can be read again."""
         return self.model_dump(exclude={"source"}, exclude_none=True)
 

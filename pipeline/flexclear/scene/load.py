@@ -103,7 +103,7 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
         if value is not None:
             _set_value(table, where, value, f"edit of {scene.name}")
         elif "." in where:
-            owner, last = _find(table, where, f"edit of {scene.name}")
+            owner, last = _find_container(table, where, f"edit of {scene.name}")
             del owner[last]
         else:
             table.pop(where, None)
@@ -170,7 +170,7 @@ def number_at(scene: Scene, path: str) -> tuple[float, str]:
 
 def number_in(table: Mapping[str, Any], path: str, where: str) -> tuple[float, str]:
     """Return a table's number at a key path, as `number_at` does; where: name of the path in errors."""
-    parent, key = _find(table, path, where)
+    parent, key = _find_container(table, path, where)
     if isinstance(parent[key], (int, float, str)) and not isinstance(parent[key], bool):
         with contextlib.suppress(ValueError):
             number, _, unit = str(any_quantity(parent[key])).partition(" ")
@@ -310,7 +310,7 @@ def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
 def _apply_edits(result: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str, Any]:
     """Apply a table's edits to the table that it extends, in place, and return that."""
     for where in table.get("remove", []):
-        parent, key = _find(result, where, f"{path} [remove]")
+        parent, key = _find_container(result, where, f"{path} [remove]")
         del parent[key]
     for edit in ("replace", "set"):
         for family, parts in table.get(edit, {}).items():
@@ -341,15 +341,15 @@ def _edit_family(result: dict[str, Any], family: str, parts: object, edit: str, 
             raise InputError(
                 f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, existing)
             )
-        existing[name] = part if edit == "replace" else _merge(existing[name], part)
+        existing[name] = part if edit == "replace" else _merge_tables(existing[name], part)
 
 
-def _merge(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+def _merge_tables(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
     """Return `old` with the named keys changed, tables key by key."""
     result = dict(old)
     for key, value in new.items():
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
-        result[key] = _merge(result[key], value) if both else value
+        result[key] = _merge_tables(result[key], value) if both else value
     return result
 
 
@@ -365,11 +365,11 @@ def _add_parts(result: dict[str, Any], family: str, parts: dict[str, Any], path:
         existing[name] = part
 
 
-def _find(table: Any, path: object, where: str) -> tuple[Any, Any]:
+def _find_container(table: Any, path: object, where: str) -> tuple[Any, Any]:
     """Return the table or list that contains a key path, and its last key; entries of lists count from 0."""
     keys = str(path).split(".")
     for depth, name in enumerate(keys):
-        key = _entry(table, name)
+        key = _key_of_entry(table, name)
         if key is None:
             known = table if isinstance(table, dict) else {}
             raise InputError(
@@ -380,7 +380,7 @@ def _find(table: Any, path: object, where: str) -> tuple[Any, Any]:
     return table, key
 
 
-def _entry(table: Any, name: str) -> str | int | None:
+def _key_of_entry(table: Any, name: str) -> str | int | None:
     """Return a table's key, or the index of a list's entry; None when it does not exist."""
     if isinstance(table, dict):
         return name if name in table else None
@@ -393,10 +393,10 @@ def _set_value(table: dict[str, Any], path: str, value: object, where: str) -> N
         table.setdefault(parent, {})
     owner: Any = table
     if parent:
-        above, last = _find(table, parent, where)
+        above, last = _find_container(table, parent, where)
         owner = above[last]
     if isinstance(owner, list):
-        owner, last = _find(table, path, where)
+        owner, last = _find_container(table, path, where)
         owner[last] = value
     elif isinstance(owner, dict):
         owner[key] = value

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from flexclear.scene.clearance import Friction, Material, NormalLaw, Wear
 from flexclear.scene.fields import FrameName, Length, Part, Positive, Speed
 from flexclear.scene.films import Film, JournalFilm
-from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Rough, Seat, Station, facing
+from flexclear.scene.pairs import Corner, Crown, Pair, Rim, Rough, Seat, Station, axes_along_side
 
 #: approach speed of a contact
 Rate = Annotated[Speed, Field(ge=0.0)]
@@ -85,7 +85,7 @@ class _Contact(Part):
         """Pairs of features that may touch, by name; an empty name stands for the only pair."""
         return {"": Pair(self)}
 
-    def begun(self, speeds: Mapping[str, float]) -> Self:
+    def with_approach_speeds(self, speeds: Mapping[str, float]) -> Self:
         """Return the joint with initial approach speeds [m/s] of pairs that touch at the start, by name."""
         return self.model_copy(update={"initial_approach_speed": speeds.get("", dict(speeds))})
 
@@ -202,7 +202,7 @@ class ClearanceRevolute(_Tilting, _Worn):
     """number of points all around at which flat faces of the collars may touch; default: 8"""
 
     @model_validator(mode="after")
-    def _tilting(self) -> Self:
+    def _require_keys_of_collars(self) -> Self:
         given = next((key for key in ("thrust_radius", "collar_radius") if getattr(self, key) is not None), "")
         if self.axial_clearance is None and given:
             raise ValueError(f"{given} is of collars, which need an axial_clearance; give both or neither")
@@ -245,9 +245,9 @@ class ClearanceRevolute(_Tilting, _Worn):
             if self.collar_radius is None:
                 crown = Crown(self, f"thrust_{k}", gap)
                 centre = Seat((0.0, 0.0, collar + side * crown.radius))
-                made[crown.name] = Pair(crown, Seat((0.0, 0.0, end), facing(2, side)), centre)
+                made[crown.name] = Pair(crown, Seat((0.0, 0.0, end), axes_along_side(2, side)), centre)
                 continue
-            face = Seat((0.0, 0.0, collar), facing(2, -side))
+            face = Seat((0.0, 0.0, collar), axes_along_side(2, -side))
             count = self.collar_points or 8
             for j in range(count):
                 angle, station = tau * j / count, Station(self, f"thrust_{k}_{j + 1}", gap, count)
@@ -341,7 +341,7 @@ class ClearancePrismatic(_Several, _Clearance):
     """elastic constants, for the stiffness"""
 
     @model_validator(mode="after")
-    def _fitting(self) -> Self:
+    def _require_keys_of_faces(self) -> Self:
         if (self.width is None) != (self.side_clearance is None):
             given, absent = ("width", "side_clearance") if self.width is not None else ("side_clearance", "width")
             raise ValueError(
@@ -413,7 +413,7 @@ class ClearancePrismatic(_Several, _Clearance):
                 face = [0.0, 0.0, 0.0]
                 face[axis] = side * (sizes[axis] + (0.0 if short else gaps[axis]))
                 turn = 2 - axis if end else 1
-                seats = Seat((face[0], face[1], face[2]), facing(axis, side if short else -side, turn))
+                seats = Seat((face[0], face[1], face[2]), axes_along_side(axis, side if short else -side, turn))
                 centre = Seat((x * inset[0], y * inset[1], z * ends))
                 made[name] = Pair(Corner(self, name, gaps[axis], end), seats, centre, swapped=short)
         return made

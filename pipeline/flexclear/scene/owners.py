@@ -30,7 +30,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
     forces, contacts, moving = (
         scene.forces(),
         scene.pairs(),
-        _still(name for name, body in scene.body.items() if not isinstance(body, Ground)),
+        _without_rotation(name for name, body in scene.body.items() if not isinstance(body, Ground)),
     )
     stops = {f"{name}.{end}": is_angle(scene, stop) for name, stop in scene.stops().items() for end in stop.ends}
     controllers = {name: load for name, load in forces.items() if isinstance(load, (Pid, SampledPid))}
@@ -39,25 +39,27 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
     return {
         "body": moving,
         "frame": _Frames(_frames(scene), unread),
-        "joint": _still(scene.joint),
+        "joint": _without_rotation(scene.joint),
         "coordinate": _coordinates(scene),
         "drive": dict(_drives(scene)),
         "controller": {name: is_angle(scene, load) for name, load in controllers.items()},
         "gear": {name: _is_angle(scene, gear.second) for name, gear in scene.gear.items()},
         "load": {name: _measures_angle(scene, load) for name, load in forces.items()},
-        "bushing": _still(name for name, load in forces.items() if isinstance(load, Bushing)),
-        "film": _still(films_of(scene)),
-        "contact": _still(contacts) | stops,
-        "rubbing": _still(scene.joints_with_friction()),
-        "worn": _still(scene.wearing_joints()),
-        "mode": _still(f"{n}.{k}" for n, c in modes.items() if isinstance(c, int) for k in range(1, c + 1)),
-        "section": _still(scene.output.stress or ()),
-        "gauge": _still(n for body in scene.output.stress or () for n in (body, *scene.output.gauge_names(body))),
-        "": _still(_names_of_all(scene)),
+        "bushing": _without_rotation(name for name, load in forces.items() if isinstance(load, Bushing)),
+        "film": _without_rotation(films_of(scene)),
+        "contact": _without_rotation(contacts) | stops,
+        "rubbing": _without_rotation(scene.joints_with_friction()),
+        "worn": _without_rotation(scene.wearing_joints()),
+        "mode": _without_rotation(f"{n}.{k}" for n, c in modes.items() if isinstance(c, int) for k in range(1, c + 1)),
+        "section": _without_rotation(scene.output.stress or ()),
+        "gauge": _without_rotation(
+            n for body in scene.output.stress or () for n in (body, *scene.output.gauge_names(body))
+        ),
+        "": _without_rotation(_names_of_all(scene)),
     }
 
 
-def _still(names: Any) -> dict[str, bool]:
+def _without_rotation(names: Any) -> dict[str, bool]:
     return dict.fromkeys(names, False)
 
 
@@ -72,7 +74,7 @@ class _Frames(dict[str, bool]):
     """Names of frames; of bodies whose recipe is left out where their bundle is given, any frame may exist."""
 
     def __init__(self, names: Iterable[str], unread: Collection[str]) -> None:
-        super().__init__(_still(names))
+        super().__init__(_without_rotation(names))
         self.unread = unread
 
     def __contains__(self, name: object) -> bool:

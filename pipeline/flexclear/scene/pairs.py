@@ -132,7 +132,7 @@ class Station(Feature):
         return 1.0 / self.count
 
 
-def facing(axis: int, side: float, turn: int = 1) -> tuple[tuple[float, float, float], ...]:
+def axes_along_side(axis: int, side: float, turn: int = 1) -> tuple[tuple[float, float, float], ...]:
     """Return axes, as of a `Seat`, whose z is a frame's axis, or for a `side` of -1 points the other way.
 
     turn: 1 or 2, the axis of the frame, counted from that one, along which x is.

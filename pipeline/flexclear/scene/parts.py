@@ -277,7 +277,7 @@ def _all_zero(inertia: Any) -> bool:
     return all(entry in (0, 0.0) for row in rows for entry in row)
 
 
-def _which(body: Any) -> str | None:
+def _model_tag(body: Any) -> str | None:
     """Return the tag of a body's model: its type, but "meshed" for a body with a recipe and no modes."""
     if isinstance(body, MeshedRigidBody):
         return "meshed"
@@ -298,7 +298,7 @@ Body = Annotated[
     | Annotated[FlexibleBody, Tag("flexible")]
     | Annotated[MeshedRigidBody, Tag("meshed")]
     | Annotated[MasslessBody, Tag("massless")],
-    Discriminator(_which),
+    Discriminator(_model_tag),
 ]
 
 

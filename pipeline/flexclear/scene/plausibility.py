@@ -31,11 +31,21 @@ UNITS = 'bare numbers are SI; with a unit they are text, as "0.2 mm" or "100 kg 
 
 def implausible_values(scene: Scene) -> list[InputError]:
     """Return implausible values, located as validation errors are; none of them is refused."""
-    checks = (_clearances, _pins, _bearings, _inertias, _masses, _intervals, _angles, _gains)
+    checks = (
+        _oversized_clearances,
+        _oversized_pins,
+        _misplaced_bearings,
+        _oversized_inertias,
+        _impossible_masses,
+        _intervals,
+        _angles_like_degrees,
+        _gains,
+    )
     return [warning for check in checks for warning in check(scene)]
 
 
-def _clearances(scene: Scene) -> Iterator[InputError]:
+def _oversized_clearances(scene: Scene) -> Iterator[InputError]:
+    """Yield clearances larger than the part that moves in them."""
     for name, joint in scene.contacts().items():
         what, size = (
             ("half height", 0.5 * joint.height) if isinstance(joint, ClearancePrismatic) else ("radius", joint.radius)
@@ -45,7 +55,7 @@ def _clearances(scene: Scene) -> Iterator[InputError]:
             yield warning(scene, f"joint.{name}.clearance", text, UNITS)
 
 
-def _pins(scene: Scene) -> Iterator[InputError]:
+def _oversized_pins(scene: Scene) -> Iterator[InputError]:
     """Yield pins and balls that are larger than the whole mechanism; frames of meshes are not known here."""
     bodies = scene.rigid().values()
     points = [point for body in scene.body.values() for point in _points(body, getattr(body, "pose", None))]
@@ -61,7 +71,7 @@ def _pins(scene: Scene) -> Iterator[InputError]:
                 yield warning(scene, f"joint.{name}.{key}", text, UNITS)
 
 
-def _bearings(scene: Scene) -> Iterator[InputError]:
+def _misplaced_bearings(scene: Scene) -> Iterator[InputError]:
     """Yield frames of a body without a pose that no part names, as another unused frame that a joint may have joined.
 
     The other frame has the same name, or is the only unused one of the ground.
@@ -83,7 +93,7 @@ def _bearings(scene: Scene) -> Iterator[InputError]:
             yield warning(scene, f"body.{name}.frames.{frame}", text, remedy)
 
 
-def _inertias(scene: Scene) -> Iterator[InputError]:
+def _oversized_inertias(scene: Scene) -> Iterator[InputError]:
     """Yield inertias too large for a body of its size; a body with one frame is compared with the whole scene."""
     scene_points = [point for body in scene.body.values() for point in _points(body, getattr(body, "pose", None))]
     whole = _extent(scene_points)
@@ -113,7 +123,7 @@ def _extent(points: list[tuple[float, float, float]]) -> float:
     return sqrt(sum((max(x) - min(x)) ** 2 for x in zip(*points, strict=True)))
 
 
-def _masses(scene: Scene) -> Iterator[InputError]:
+def _impossible_masses(scene: Scene) -> Iterator[InputError]:
     """Yield masses that no body with its inertia can have."""
     bodies = {name: body for name, body in scene.rigid().items() if body.mass}
     for name, body in bodies.items():
@@ -149,7 +159,7 @@ def _intervals(scene: Scene) -> Iterator[InputError]:
         yield warning(scene, "output.interval", text, f'choose a shorter one, as "{1e3 * duration / 200:.1g} ms"')
 
 
-def _angles(scene: Scene) -> Iterator[InputError]:
+def _angles_like_degrees(scene: Scene) -> Iterator[InputError]:
     """Yield bare numbers of angles that look like degrees."""
     for name, drive in scene.drive.items():
         if isinstance(drive, JointDrive) and is_angle(scene, drive):

@@ -142,7 +142,7 @@ class Quantity:
         if not self.steps:
             return KINDS[self.kind].units[self.turns]
         measured = measure(self.steps)[0]
-        return next((t.unit for t in self.terms() if units.unit_exponents(t.unit) == measured), units.si(measured))
+        return next((t.unit for t in self.terms() if units.unit_exponents(t.unit) == measured), units.si_unit(measured))
 
     @property
     def dim(self) -> str:
@@ -167,22 +167,23 @@ class Quantity:
         """Return True when a scene has the quantity; owners as in `parse`."""
         return all((term.owner or term.kind) in owners.get(KINDS[term.kind].owner, ()) for term in self.terms())
 
-    def written(self) -> list[Any]:
+    def to_json(self) -> list[Any]:
         """Return the quantity as JSON, which `read_expression` parses."""
-        steps = [step.written() if isinstance(step, Quantity) else step for step in self.steps]
+        steps = [step.to_json() if isinstance(step, Quantity) else step for step in self.steps]
         return [self.owner, self.kind, self.component, self.turns, self.text, steps]
 
     @classmethod
-    def read(cls, data: Sequence[Any]) -> Quantity:
-        """Return the quantity from the JSON that `written` returned."""
+    def from_json(cls, data: Sequence[Any]) -> Quantity:
+        """Return the quantity from the JSON that `to_json` returned."""
         owner, kind, component, turns, text, steps = data
-        return cls(owner, kind, component, turns, text, tuple(_step(step) for step in steps))
+        return cls(owner, kind, component, turns, text, tuple(_read_step(step) for step in steps))
 
 
-def _step(step: Any) -> Any:
+def _read_step(step: Any) -> Any:
+    """Return one step of an expression from its JSON: operator, nested quantity or number with its exponents."""
     if isinstance(step, str):
         return step
-    return Quantity.read(step) if len(step) > 2 else tuple(step)
+    return Quantity.from_json(step) if len(step) > 2 else tuple(step)
 
 
 _CALL = re.compile(rf"(?<![\w.-])(?!(?:{'|'.join((*FUNCTIONS, *SEVERAL))})\b)(\w+)\(\s*([\w.-]+)\s*\)")
@@ -206,7 +207,7 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     return quantity if quantity.name == text else replace(quantity, text=text)
 
 
-def condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
+def parse_condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     """Return the quantity that is positive where a comparison, as ``force(A1) > 200 N``, is true; vectors by magnitude.
 
     owners: as in `parse`. Raises ValueError for text that is no comparison of quantities.
@@ -363,7 +364,7 @@ class Recorded:
         return (*time, inner) if inner else time
 
     @property
-    def throughout(self) -> bool:
+    def needs_regular_times(self) -> bool:
         """True when the reduction needs the regular output times."""
         return self.reduction == "series" or (self.quantity.over_time and self.reduction in THROUGHOUT)
 

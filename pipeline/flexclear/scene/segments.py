@@ -131,7 +131,7 @@ def _frames_of_recipe(mesh: str, count: int, changed: int, size: int) -> list[li
 def _frames_of(recipe: Mapping[str, Any], count: int) -> list[list[str]]:
     """Return the frames on each segment, those at its cut ends included; ValueError if the recipe cannot be cut so."""
     x = list(_nodes(recipe))
-    at, close = [x[node] for node in cuts(x, count)], SAME_PLACE * (x[-1] - x[0])
+    at, close = [x[node] for node in nodes_of_cuts(x, count)], SAME_PLACE * (x[-1] - x[0])
     places = {name: quantity(frame["x"], "length") for name, frame in recipe["frames"].items()}
     for taken in places.keys() & {f"cut_{k}" for k in range(1, count)}:
         raise ValueError(f"its frame '{taken}' has the name of an end of a segment")
@@ -147,7 +147,7 @@ def cut_names(segment: Sequence[int]) -> list[str]:
     return [f"cut_{end}" for end in (k - 1, k) if 0 < end < count]
 
 
-def cuts(x: Sequence[float], count: int) -> list[int]:
+def nodes_of_cuts(x: Sequence[float], count: int) -> list[int]:
     """Return the nodes, of those at `x` along a rod [m], that are nearest to the ends of `count` equal segments.
 
     Raises ValueError where two ends have the same node.

@@ -39,7 +39,7 @@ class Solver(Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _known(cls, table: Any) -> Any:
+    def _require_known_names(cls, table: Any) -> Any:
         """Refuse the name of an unknown integrator, and a parameter that belongs to another integrator."""
         if not isinstance(table, Mapping):
             return table
@@ -53,7 +53,7 @@ class Solver(Part):
         return dict(table) | own
 
     @model_validator(mode="after")
-    def _located_unless_fixed(self) -> Self:
+    def _require_step_for_events(self) -> Self:
         if self.events != "located" and self.step is None:
             raise ValueError('events = "at step ends" needs fixed steps: give step, or leave events out')
         return self

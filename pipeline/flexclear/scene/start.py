@@ -123,7 +123,7 @@ class Start(Part):
         return self.at if self.run is None else "recorded"
 
     @model_serializer(mode="wrap")
-    def _written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _write_keys(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Return the keys as a scene writes them."""
         return {"from" if key == "run" else key: value for key, value in handler(self).items()}
 

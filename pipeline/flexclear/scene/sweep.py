@@ -57,7 +57,7 @@ class Parameter(Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _bare(cls, given: Any) -> Any:
+    def _list_as_values(cls, given: Any) -> Any:
         return {"values": given} if isinstance(given, (list, tuple)) else given
 
     @model_validator(mode="after")

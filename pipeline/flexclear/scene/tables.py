@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from flexclear.scene.expression import Lookup
 from flexclear.scene.fields import Part
 from flexclear.scene.laws import Column, read_columns
-from flexclear.scene.units import si, unit, unit_exponents
+from flexclear.scene.units import si_unit, unit, unit_exponents
 
 #: largest number of points
 MOST_POINTS = 5_000
@@ -88,13 +88,16 @@ class LookupTable(Part):
 
     def function(self, name: str) -> Lookup:
         """Return what an expression knows of the table under its name."""
-        of, value = (si(unit_exponents(column.unit)) for column in self.of), si(unit_exponents(self.value.unit))
+        of, value = (
+            (si_unit(unit_exponents(column.unit)) for column in self.of),
+            si_unit(unit_exponents(self.value.unit)),
+        )
         return Lookup(name, tuple(of), value)
 
     def axes(self) -> tuple[tuple[float, ...], ...]:
         """Return the values of each quantity in SI, ascending."""
         return _axes(self.points, len(self.of))
 
-    def levels(self) -> tuple[int, ...]:
+    def halvings(self) -> tuple[int, ...]:
         """Return how often the intervals of each quantity are halved to find one."""
         return tuple((len(axis) - 2).bit_length() for axis in self.axes())

@@ -88,7 +88,7 @@ def with_line_number(error: InputError) -> InputError:
     """Return the error with the line behind its key path, where a file contains the path; for several errors, each."""
     if isinstance(error, InputErrors):
         return InputErrors([with_line_number(one) for one in error.errors])
-    position = where(error)
+    position = locate_error(error)
     if position is None or _LINE.match(error.place):
         return error
     file, line = position
@@ -106,7 +106,7 @@ def with_file_name(error: InputError, path: Path | None) -> InputError:
     return InputError(f"{path} {error.place}", error.problem, error.remedy)
 
 
-def where(error: InputError) -> tuple[Path, int] | None:
+def locate_error(error: InputError) -> tuple[Path, int] | None:
     """Return file and line of an error's key path, which may be written in a scene that the file extends."""
     if found := _LINE.match(error.place):
         return Path(found["file"]), int(found["line"])
@@ -164,8 +164,6 @@ def _keys(dotted: str) -> tuple[str, ...]:
     return tuple(key.strip("\"'") for key in re.findall(_KEY, dotted))
 
 
-#: largest length of a line for which a correction is suggested
-LONGEST_MENDED = 300
 _NUMBER = re.compile(r"\(at line (\d+)")
 _AT = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
 _OTHER = "put names with characters other than A to z, digits, - and _ in quotation marks"
@@ -200,7 +198,8 @@ def _common_error(line: str) -> tuple[str, str] | None:
             f"a quotation mark is missing: {bare}",
             'put text and quantities with units between two quotation marks: "1 mm"',
         )
-    quoted = _quote_quantities(line) if len(line) <= LONGEST_MENDED else line
+    # 300: largest length of a line for which a correction is suggested
+    quoted = _quote_quantities(line) if len(line) <= 300 else line
     if quoted != line:
         return f"a quantity with a unit needs quotation marks: {bare}", f"write {quoted.strip()}"
     if value and re.fullmatch(r"[-+]?\d+,\d+", value[2]):

@@ -168,7 +168,7 @@ def exponents(dimension: str) -> Exponents:
     return _EXPONENTS[dimension]
 
 
-def si(exponents: Exponents) -> str:
+def si_unit(exponents: Exponents) -> str:
     """Return the SI unit with these exponents of kg, m, s and rad: by its name if it has one, "1" for a number."""
     name = next((name for name, known in _EXPONENTS.items() if known == exponents), "")
     if one := _example(name, factor=1.0):
@@ -283,7 +283,7 @@ def any_quantity(value: object) -> float | str:
         return f"{quantity(value, known[1])!r} {_example(known[1], factor=1.0)}"
     if match is None or product is None:
         raise ValueError(unknown_unit_message(written, str(value)))
-    return f"{_check_finite(float(match[1]) * product[0], value)!r} {si(product[1])}"
+    return f"{_check_finite(float(match[1]) * product[0], value)!r} {si_unit(product[1])}"
 
 
 def unknown_unit_message(written: str, value: str = "") -> str:

@@ -60,11 +60,11 @@ def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel
     for e in error.errors(include_url=False)[:500]:
         invalid = _input_error(path, e, model)
         places.setdefault(invalid.place, []).append((e["type"], invalid))
-    unique = {str(e): e for candidates in places.values() for e in _nearest(candidates)}
+    unique = {str(e): e for candidates in places.values() for e in _nearest_errors(candidates)}
     return InputErrors(list(unique.values()))
 
 
-def _nearest(candidates: list[tuple[str, InputError]]) -> list[InputError]:
+def _nearest_errors(candidates: list[tuple[str, InputError]]) -> list[InputError]:
     """Return the errors at one location: of several alternatives, only those that fit the value's kind."""
     fitting = [candidate for kind, candidate in candidates if kind not in OTHER_KIND]
     others = {candidate.problem: candidate for kind, candidate in candidates if kind in OTHER_KIND}
@@ -125,7 +125,7 @@ def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], lis
     """
     keys, alternatives, known_keys = list[Any](), [model], list[str]()
     for key in loc:
-        inner = [candidate for a in alternatives for candidate in _inside(a, key)]
+        inner = [candidate for a in alternatives for candidate in _types_below(a, key)]
         if inner:
             keys.append(key)
             known_keys, alternatives = _keys(alternatives), inner
@@ -148,7 +148,7 @@ def _alternatives(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-def _inside(alternative: Any, key: Any) -> list[Any]:
+def _types_below(alternative: Any, key: Any) -> list[Any]:
     """Return the types that may be under a key of a table or list."""
     if _is_model(alternative):
         alternative.model_rebuild()  # resolves the types of laws that contain laws

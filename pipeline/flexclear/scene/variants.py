@@ -147,7 +147,7 @@ def effects_by_name(scene: Scene, names: Iterable[str], where: str) -> tuple[Eff
     return tuple(known[name] for name in names)
 
 
-def without(scene: Scene, gone: Collection[Effect]) -> Scene:
+def without_effects(scene: Scene, gone: Collection[Effect]) -> Scene:
     """Return the scene without some of its effects; quantities that the rest does not have are no longer requested.
 
     The name lists the removed effects. Without any the scene itself is returned.
@@ -163,7 +163,7 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
     return result
 
 
-def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene:
+def ideal_scene(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene:
     """Return the ideal mechanism of a scene: without clearance, flexibility, or both, with the scene's name.
 
     Raises InputError when the scene has none of them.
@@ -175,7 +175,7 @@ def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene
             f"has no {' and no '.join(effects_gone)} that can be removed",
             "compare it with another scene: flexclear compare A B",
         )
-    result = without(scene, gone)
+    result = without_effects(scene, gone)
     result._name = scene.name
     return result
 
@@ -327,7 +327,7 @@ def _texts(value: object) -> Iterator[str]:
             yield from _texts(item)
 
 
-def text(scene: Scene, planned: Scene, extends: str, comments: Iterable[str] = ()) -> str:
+def variant_text(scene: Scene, planned: Scene, extends: str, comments: Iterable[str] = ()) -> str:
     """Return the file of a variant: it extends the scene's file, and contains only parts and settings that differ.
 
     Parts are replaced or removed; a setting that differs is written as a whole table. comments: lines at the head.
@@ -370,7 +370,7 @@ def _value(value: Any) -> str:
     return ("true" if value else "false") if isinstance(value, bool) else repr(value)
 
 
-def relative(target: Path, base: Path) -> str:
+def relative_path(target: Path, base: Path) -> str:
     """Return a path from a file's folder to the scene that it extends; in full where that is on another drive."""
     try:
         return Path(os.path.relpath(base.resolve(), target.resolve().parent)).as_posix()

@@ -69,6 +69,6 @@ def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
 def state_space(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Return the state space about the equilibrium in a `pose` (schema STATE_SPACE); inputs are ``bundle/<body>``."""
     pose, scene = params["pose"], rebuild(params, inputs)
-    outputs = [Quantity.read(data) for data in params["outputs"]]
+    outputs = [Quantity.from_json(data) for data in params["outputs"]]
     where = pose["time"], pose["drives"], pose["held"]
     return {"nc": analyses.state_space(scene, bundles(inputs), progress, outputs, *where)}

@@ -33,7 +33,9 @@ PAIR, LEAST_HALVED = 2, 4
 def task(scene: Scene, *, watched: bool = False) -> Task:
     """Return the task that plans a scene; its artifact is shown as ``plan.nc``. watched: as of `plan`."""
     rigid = edited(
-        variants.without(scene, [effect for effect in variants.effects(scene) if effect.name.startswith("body.")]),
+        variants.without_effects(
+            scene, [effect for effect in variants.effects(scene) if effect.name.startswith("body.")]
+        ),
         {"accuracy": None},
     )
     whole = Graph(edited(scene, {"accuracy": None}), shown=False)
@@ -52,7 +54,7 @@ def task(scene: Scene, *, watched: bool = False) -> Task:
             "units": {q.name: q.unit for q in scene.requested_quantities()},
             "watched": watched,
         },
-        context={"name": scene.name, "limits": scene.limits.written()},
+        context={"name": scene.name, "limits": scene.limits.as_table()},
         inputs=inputs,
         code=(*simulation.CODE, "flexclear.post"),
         folder=f"plan/{scene.name.replace('/', '_')}",

@@ -28,7 +28,7 @@ def verdict(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 def overview(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Draw the general figures (PNG and SVG by file name) of ``run`` and ``post``; params: `watched` quantities."""
     progress(None, "figures")
-    return dict(figures.make(inputs["run"], [Quantity.read(data) for data in params["watched"]], inputs["post"]))
+    return dict(figures.make(inputs["run"], [Quantity.from_json(data) for data in params["watched"]], inputs["post"]))
 
 
 def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -39,7 +39,7 @@ def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], prog
     """
     runs = {label: inputs[f"run{k}"] for k, label in enumerate(params["labels"])}
     tighter = {label: inputs[f"tight{k}"] for k, label in enumerate(params["labels"]) if f"tight{k}" in inputs}
-    chosen = [Quantity.read(data) for data in params["quantities"]]
+    chosen = [Quantity.from_json(data) for data in params["quantities"]]
     progress(None, "comparing")
     compared = compared_runs.assemble(runs, tighter, chosen)
     result: dict[str, Any] = {"nc": compared}

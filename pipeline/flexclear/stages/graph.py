@@ -221,7 +221,7 @@ class Graph:
         """Return the task of the state space about the equilibrium in one pose; shown as ``state_space.nc``."""
         params = {
             **simulation.params(self.scene, without=("output",)),
-            "outputs": [quantity.written() for quantity in self.scene.watched_quantities()],
+            "outputs": [quantity.to_json() for quantity in self.scene.watched_quantities()],
             "pose": {"time": time, "drives": dict(drives or {}), "held": held},
         }
         return self._simulation("state_space", params)
@@ -263,7 +263,7 @@ class Graph:
     def overview(self) -> Task:
         """Task of the general figures of the run."""
         inputs = {"run": self.simulate, "post": self.post}
-        watched = {"watched": [quantity.written() for quantity in self.scene.watched_quantities()]}
+        watched = {"watched": [quantity.to_json() for quantity in self.scene.watched_quantities()]}
         task = self._task("overview", "evaluation:overview", watched, inputs)
         return replace(task, part="figures", folder=self._folder("figures"))
 
@@ -306,7 +306,7 @@ class Graph:
         shown: name of the dataset, without its ending, where it differs from the store's.
         """
         names = {"nc": f"{part}.nc", "vtu": f"{part}.vtu"} if part else {"nc": f"{shown}.nc"} if shown else {}
-        of_scene = {} if part else {"name": self.scene.name, "limits": self.scene.limits.written()}
+        of_scene = {} if part else {"name": self.scene.name, "limits": self.scene.limits.as_table()}
         of_scene |= {PATH: str(self.scene.path)} if of_scene and self.scene.path is not None else {}
         return Task(
             stage=stage,

@@ -13,7 +13,7 @@ from flexclear.scene.load import RECIPE, is_file, require_kind
 from flexclear.scene.toml_files import read_toml
 from flexclear.structure.kinds import name_of
 from flexclear.system.errors import InputError
-from flexclear.system.external_files import companions
+from flexclear.system.external_files import companion_files
 from flexclear.workflow.fingerprint import library_version
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def kind_of(recipe: Path) -> str:
 
 def files(table: Mapping[str, Any], folder: Path) -> dict[str, Path]:
     """Return the files that a recipe names, and those read with them, by their paths relative to the recipe."""
-    opened = [file for path in named_files(table, folder) for file in (path, *companions(path))]
+    opened = [file for path in named_files(table, folder) for file in (path, *companion_files(path))]
     return {_relative(path, folder): path for path in opened}
 
 

@@ -10,7 +10,7 @@ from flexclear.post.render import gl
 from flexclear.scene.parts import UNSEEN
 from flexclear.scene.quantity import Quantity
 from flexclear.stages.simulation import bundles
-from flexclear.system.external_files import companions
+from flexclear.system.external_files import companion_files
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,7 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     """Return subject, format, view, watched parts, and the GL libraries where pictures depend on them."""
     values: dict[str, Any] = {"what": what, "format": kind}
     if what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4"):
-        values["gl"] = gl.state()  # which GL libraries this machine has
+        values["gl"] = gl.library_state()  # which GL libraries this machine has
     if kind == "html":
         values["title"] = scene.title
     if what != "modes":
@@ -46,7 +46,7 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
         terms = [term for quantity in scene.watched_quantities() for term in quantity.terms()]
         values["watched"] = list(dict.fromkeys(term.owner for term in terms if term.owner))
         if what in FILMED and scene.view is not None and scene.view.watch is not None:
-            values["curves"] = [quantity.written() for quantity in scene.watched_quantities()]
+            values["curves"] = [quantity.to_json() for quantity in scene.watched_quantities()]
     return values
 
 
@@ -60,7 +60,7 @@ def files(scene: Scene, what: str) -> dict[str, Path]:
     """Return the files of the shapes shown, and those that their formats read with them, by path."""
     looks = _looks(scene).values() if what != "modes" else ()
     named = [Path(shape["file"]) for look in looks for shape in look.get("geometry", ()) if shape["type"] == "file"]
-    return {str(file): file for path in named for file in (path, *companions(path))}
+    return {str(file): file for path in named for file in (path, *companion_files(path))}
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         bundles=bundles(inputs),
         looks=Looks(bodies=params.get("bodies", {}), **params.get("view", {})),
         watched=params.get("watched", ()),
-        curves=[Quantity.read(data) for data in params.get("curves", ())],
+        curves=[Quantity.from_json(data) for data in params.get("curves", ())],
         title=str(params.get("title", "")),
         progress=progress,
     )

@@ -38,7 +38,7 @@ from flexclear.stages.meshing import kind_of
 from flexclear.stages.notebook import run_head
 from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
 from flexclear.system.errors import InputError, ResourceError, SolverError, errors_from, errors_of, refuse
-from flexclear.system.external_files import reading, require_file
+from flexclear.system.external_files import convert_reader_errors, require_file
 from flexclear.system.version import DISTRIBUTION
 from flexclear.workflow.progress import WARNING
 from flexclear.workflow.schedule import Outcome
@@ -151,7 +151,7 @@ def _dataset(path: Path) -> xr.Dataset:
 
     require_file(path, str(path))
     remedy = "name a scene, or a file below results/runs such as run.nc; xarray.open_dataset opens any other"
-    with reading(path, str(path), "cannot be read as a NetCDF dataset", remedy):
+    with convert_reader_errors(path, str(path), "cannot be read as a NetCDF dataset", remedy):
         dataset = xr.load_dataset(path, engine="netcdf4")
     if not str(dataset.attrs.get("source")).startswith(f"{DISTRIBUTION} "):
         why = "is not a dataset of a scene: it has no attribute `source` that names flexclear"
@@ -163,7 +163,7 @@ def _of_another_run(folder: Path) -> bool:
     """Return True when the shown post.nc is derived from another run than the shown one, as after edits and
     `fc.run`."""
     store, where = Store(results_root()), folder.relative_to(results_root()).as_posix()
-    post, made = store.last(where, "post"), store.last(where, "simulate")
+    post, made = store.last_shown(where, "post"), store.last_shown(where, "simulate")
     return post is not None and made is not None and post.facts.get("input run") != made.digest
 
 

@@ -134,7 +134,7 @@ def files_of(scene: Scene, view: StartView, folder: Path, *, quiet: bool = False
     """Write the page, and the picture where this machine can draw.  Raises ResourceError."""
     stem = Path(scene.name).name
     content = {f"{stem}_start.html": _page(scene, view)}
-    if gl.works():
+    if gl.can_draw():
         from flexclear.post.render.pictures import png
         from flexclear.post.render.start_view import picture
 

@@ -33,7 +33,7 @@ def effects(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     """
     from flexclear.post.answers import effect_answer, effect_sizes
 
-    chosen = [Quantity.read(data) for data in params["quantities"]]
+    chosen = [Quantity.from_json(data) for data in params["quantities"]]
     progress(None, "comparing")
 
     def pair(name: str, members: int) -> effect_sizes.Pair:
@@ -96,7 +96,7 @@ def _error_of(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Ca
         runs = [inputs[name] for name in ("own", "tight") if name in inputs]
         if len(runs) < 2 or not all(quantities.has_quantity(run, quantity) for run in runs):
             return 0.0
-        return float(params["looser"]) * quantities.error(runs[0], runs[1], quantity, until)
+        return float(params["looser"]) * quantities.largest_distance(runs[0], runs[1], quantity, until)
 
     return error
 
@@ -113,7 +113,7 @@ def cost(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: 
 
     points = [MeasuredRun(**one) for one in params["points"]]
     runs = {OWN: inputs["own"]} | {point.key: inputs[f"point{k}"] for k, point in enumerate(points)}
-    study = assemble(points, runs, [Quantity.read(data) for data in params["quantities"]])
+    study = assemble(points, runs, [Quantity.from_json(data) for data in params["quantities"]])
     study.attrs |= params["own"] | {"undone": params["undone"], "complete": int(params["complete"])}
     title = params["title"]
     figure = work_precision.make("work_precision", study, f"Error against cost: {title}")

@@ -40,7 +40,7 @@ def member_tasks(scene: Scene, chosen: Sequence[Quantity], members: int) -> list
     variant = plain(scene)
     count, bodies = _count_members(variant, members), Graph(variant, shown=False).bodies()
     ends = [*(end for end in BATCHES if end < count), count]
-    written = [q.written() for q in chosen]
+    written = [q.to_json() for q in chosen]
     return [
         _task("members", variant, f"members {first + 1} to {end}" if first else "", written, bodies, [first, end])
         for first, end in zip([0, *ends], ends, strict=False)
@@ -84,9 +84,9 @@ def members(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     `members` is the number of runs.
     """
     from flexclear.artifacts.effect_size import compared_values
-    from flexclear.artifacts.points import batch
+    from flexclear.artifacts.points import dataset_of_batch
 
-    chosen = [Quantity.read(data) for data in params["quantities"]]
+    chosen = [Quantity.from_json(data) for data in params["quantities"]]
     scene, reduced, compiling = _with_kernels(params, inputs, progress)
     begun, (first, end) = kernels.processor_time(), params["members"]
     point = watch(scene, reduced, chosen, end - first, first)
@@ -95,7 +95,7 @@ def members(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
         "compile_seconds": compiling,
         "cpu_seconds": kernels.processor_time() - begun,
     }
-    return {"nc": batch({"point": point}, compared_values(scene.owners(), chosen)).assign_attrs(spent)}
+    return {"nc": dataset_of_batch({"point": point}, compared_values(scene.owners(), chosen)).assign_attrs(spent)}
 
 
 def measure(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -126,7 +126,7 @@ def measure(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error), "compile_seconds": compiling})}
     kept = inputs.get("run", done)
-    recorded = quantities.keep(kept, [parse(name, scene.owners()) for name in params["quantities"]])
+    recorded = quantities.select_variables(kept, [parse(name, scene.owners()) for name in params["quantities"]])
     attributes = {"units": "s", "long_name": "processor time of the integration of a warm run"}
     recorded["cpu_repeat"] = (("repeat",), integration, attributes)
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}

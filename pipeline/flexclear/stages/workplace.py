@@ -24,7 +24,7 @@ from flexclear.system.log import set_level
 from flexclear.workflow import stopping, workers
 from flexclear.workflow.fingerprint import Sources, sources_of
 from flexclear.workflow.progress import Monitor
-from flexclear.workflow.schedule import Outcome, bring
+from flexclear.workflow.schedule import Outcome, bring_up_to_date
 from flexclear.workflow.task import Task
 
 if TYPE_CHECKING:
@@ -134,10 +134,10 @@ class Workplace:
     def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
         """Bring tasks up to date in at most `jobs` processes; default: this workplace's, else the number of cores."""
         with self.time_limit():
-            return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
+            return bring_up_to_date(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
 
     def artifacts(self, outcome: Outcome) -> dict[Task, Made]:
-        """Return the artifacts that `bring` produced or that were up to date, by task."""
+        """Return the artifacts that `bring_up_to_date` produced or that were up to date, by task."""
         return {task: Made(task, record, self.store) for task, record in outcome.records.items()}
 
     def made(self, *tasks: Task, jobs: int | None = None) -> list[Made]:

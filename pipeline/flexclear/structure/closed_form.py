@@ -53,7 +53,7 @@ class Span:
     shear: float = math.inf  #: kappa G A [N]
 
 
-def columns(
+def exact_frequencies(
     mesh: xr.Dataset, reference: str, families: Sequence[str], interfaces: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
     """Return exact frequencies [Hz] by theory, each of shape (mode,); empty where no closed form applies.
@@ -64,12 +64,12 @@ def columns(
     ends = _ends(mesh, reference, interfaces)
     if ends is None or not _uniform(mesh):
         return {}
-    tables = {"exact_euler_bernoulli": _table(mesh, ends, families, rotary=False, shear=False)}
+    tables = {"exact_euler_bernoulli": _frequencies_of_families(mesh, ends, families, rotary=False, shear=False)}
     if mesh.attrs["theory"] == "euler-bernoulli":
         return tables  # such a mesh does not hold the rotary inertia
-    tables["exact_rayleigh"] = _table(mesh, ends, families, rotary=True, shear=False)
+    tables["exact_rayleigh"] = _frequencies_of_families(mesh, ends, families, rotary=True, shear=False)
     if "shear_coefficient" in mesh:
-        tables["exact_timoshenko"] = _table(mesh, ends, families, rotary=True, shear=True)
+        tables["exact_timoshenko"] = _frequencies_of_families(mesh, ends, families, rotary=True, shear=True)
     return tables
 
 
@@ -93,23 +93,27 @@ def _uniform(mesh: xr.Dataset) -> bool:
     return not any(np.ptp(values, axis=0).any() for values in constants) and not any(name in mesh for name in BEYOND)
 
 
-def _table(mesh: xr.Dataset, ends: Ends, families: Sequence[str], *, rotary: bool, shear: bool) -> np.ndarray:
+def _frequencies_of_families(
+    mesh: xr.Dataset, ends: Ends, families: Sequence[str], *, rotary: bool, shear: bool
+) -> np.ndarray:
     result = np.empty(len(families))
     for name in set(families):
         places = [k for k, family in enumerate(families) if family == name]
-        result[places] = _series(mesh, ends, name, len(places), rotary=rotary, shear=shear)
+        result[places] = _frequencies_of_family(mesh, ends, name, len(places), rotary=rotary, shear=shear)
     return result
 
 
-def _series(mesh: xr.Dataset, ends: Ends, family: str, count: int, *, rotary: bool, shear: bool) -> np.ndarray:
+def _frequencies_of_family(
+    mesh: xr.Dataset, ends: Ends, family: str, count: int, *, rotary: bool, shear: bool
+) -> np.ndarray:
     of_bending, torsion, extension = ends
     length = float(np.ptp(mesh["abscissa"].values))
     area, E, G, rho = (float(mesh[name].values[0]) for name in CONSTANTS)
     second, inertia = (mesh[name].values[0] for name in ("second_moment", "inertia_moment"))
     if family == "axial":
-        return rod(math.sqrt(E / rho), length, extension, count)
+        return rod_frequencies(math.sqrt(E / rho), length, extension, count)
     if family == "torsion":
-        return rod(math.sqrt(G * second[0] / (rho * inertia[0])), length, torsion, count)
+        return rod_frequencies(math.sqrt(G * second[0] / (rho * inertia[0])), length, torsion, count)
     # deflection in y bends about z, deflection in z about y
     axis, across = (2, 1) if family == "bending_y" else (1, 2)
     kappa = float(mesh["shear_coefficient"].values[0, across]) if shear else math.inf
@@ -117,7 +121,7 @@ def _series(mesh: xr.Dataset, ends: Ends, family: str, count: int, *, rotary: bo
     return bending_frequencies(span, of_bending, count)
 
 
-def rod(wave_speed: float, length: float, ends: str, count: int) -> np.ndarray:
+def rod_frequencies(wave_speed: float, length: float, ends: str, count: int) -> np.ndarray:
     """Return axial or torsional frequencies [Hz], (count,): n c / 2 L for equal ends, (n - 1/2) c / 2 L for unequal.
 
     wave_speed: sqrt(E/rho), or sqrt(G J / rho I_p) [m/s].  ends: ``fixed`` or ``free`` for each end, with a hyphen.

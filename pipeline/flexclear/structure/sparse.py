@@ -52,7 +52,7 @@ class Front:
         """Add the lower triangle of a child's matrix; at: indices of its rows in this front, ascending."""
         k = len(self.diagonal)
         own = int(np.searchsorted(at, k))
-        own_runs, rest_runs = _runs(at[:own]), _runs(at[own:] - k)
+        own_runs, rest_runs = _index_runs(at[:own]), _index_runs(at[own:] - k)
         _add_lower(self.diagonal, own_runs, child[:own, :own])
         for row, rows in rest_runs:
             for column, columns in own_runs:
@@ -93,7 +93,7 @@ class Factor:
 Runs = list[tuple[slice, slice]]
 
 
-def _runs(at: np.ndarray) -> Runs:
+def _index_runs(at: np.ndarray) -> Runs:
     """Return runs of consecutive indices and their ranges in `at`: adding slices is much faster than by index."""
     if not len(at):
         return []
@@ -119,12 +119,12 @@ def cholesky(matrix: sp.csr_array, positions: np.ndarray, progress: Progress = l
         diagonal, info = lapack.dpotrf(front.diagonal, lower=1, clean=1, overwrite_a=1)
         if info != 0:
             raise SolverError(f"modes: a matrix of {len(tree.order)} rows is not positive definite")
-        under = _under(diagonal, front)
+        under = _rows_below_diagonal(diagonal, front)
         blocks.append(replace(front, diagonal=diagonal, under=under, rest=np.empty((0, 0))))
     return Factor(tree.order, tuple(blocks))
 
 
-def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
+def _rows_below_diagonal(diagonal: np.ndarray, front: Front) -> np.ndarray:
     """Return the factor's rows below the diagonal block; eliminate the own unknowns from the rest, in place."""
     if not len(front.below):
         return front.under
@@ -146,7 +146,7 @@ def _eliminate(front: Front) -> int:
     """Eliminate the own unknowns in place and return the number of negative pivots."""
     diagonal, info = lapack.dpotrf(front.diagonal, lower=1)
     if info == 0:
-        _under(diagonal, front)
+        _rows_below_diagonal(diagonal, front)
         return 0
     factor, pivots, _ = lapack.dsytrf(front.diagonal, lower=1)
     if len(front.below):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexclear.artifacts.store import publish
 from flexclear.post.pages import Part, page
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import EFFECTS, ideal, idealised_effects
+from flexclear.scene.variants import EFFECTS, ideal_scene, idealised_effects
 from flexclear.stages.graph import Graph
 from flexclear.stages.scenes import joint_folder_name, pictures, tables
 from flexclear.stages.workplace import Made, Workplace, check, open_workplace
@@ -78,7 +78,7 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
     ideals: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
         if idealised_effects(scene, effects) or not ideals:
-            made = ideal(scene, effects)
+            made = ideal_scene(scene, effects)
             same = any(made.model_dump() == other.model_dump() for other in ideals)
             made._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
             ideals += [] if same else [made]
@@ -94,7 +94,7 @@ def parts(made: Made) -> list[Part]:
 
 
 def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
-    quantities = {q.name: q.written() for graph in graphs.values() for q in graph.scene.watched_quantities()}
+    quantities = {q.name: q.to_json() for graph in graphs.values() for q in graph.scene.watched_quantities()}
     labels = list(graphs)
     inputs = {f"run{k}": graphs[label].simulate for k, label in enumerate(labels)}
     inputs |= {f"tight{k}": tight[label] for k, label in enumerate(labels) if label in tight}

@@ -101,7 +101,7 @@ class Study:
         chosen = self.scene.requested_quantities() if self.scene.accuracy is not None else None
         params = {
             "points": [{"key": d.key, **d.setting} for d in others],
-            "quantities": [q.written() for q in chosen or self.scene.watched_quantities()],
+            "quantities": [q.to_json() for q in chosen or self.scene.watched_quantities()],
             "title": self.scene.title,
             "own": {f"own_{name}": value for name, value in own.setting.items()},
             "complete": self._complete and not self.undone,

@@ -80,7 +80,7 @@ def examine_effects(
     params = {
         "title": scene.title,
         "looser": errors.looser,
-        "quantities": [q.written() for q in chosen],
+        "quantities": [q.to_json() for q in chosen],
         "units": [q.unit for q in chosen],
         "outputs": [scene.time.start, scene.output.interval],
         "variants": [sorted(names) for names in ran],
@@ -126,4 +126,4 @@ def removals(scene: Scene, effects: Sequence[Effect], ideal: str) -> dict[str, N
 
 def _without(scene: Scene, effects: Sequence[Effect], gone: Names, setting: Setting, *, tight: bool = False) -> Scene:
     """Return the scene without effects, by the method of its own run; tight: as of `with_setting`."""
-    return with_setting(variants.without(scene, [e for e in effects if e.name in gone]), setting, tight=tight)
+    return with_setting(variants.without_effects(scene, [e for e in effects if e.name in gone]), setting, tight=tight)

@@ -67,7 +67,7 @@ def dataset(scene: Scene, level: str | None, budget: str | float | None) -> Resu
     [s], or text; None leaves the errors out.
     """
     from flexclear.post.answers.answered import with_answer
-    from flexclear.post.answers.plan import verification_table, words
+    from flexclear.post.answers.plan import plan_in_words, verification_table
 
     workplace = open_workplace()
     planned = make_plan(scene, workplace, level)
@@ -78,7 +78,7 @@ def dataset(scene: Scene, level: str | None, budget: str | float | None) -> Resu
             {name: compared[name] for name in ("requested", "error", "chance", "allowed", "horizon", "scatter")}
         )
         table = as_html(verification_table(compared)) + table
-    return Result(planned.planned, with_answer(result, words(result), planned.made.read("plan.png"), table))
+    return Result(planned.planned, with_answer(result, plan_in_words(result), planned.made.read("plan.png"), table))
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Planned:
             "omitted: effects that the requested accuracy of the full scene does not require",
         )
         base = load_scene(self.scene.path)
-        return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
+        return variants.variant_text(base, self.planned, variants.relative_path(target, self.scene.path), head).encode()
 
 
 def make_plan(scene: Scene, workplace: Workplace, level: str | None = None) -> Planned:
@@ -133,7 +133,7 @@ def make_plan(scene: Scene, workplace: Workplace, level: str | None = None) -> P
 def planned_scene(scene: Scene, plan: xr.Dataset) -> Scene:
     """Apply a plan to a scene: replace and remove parts, set solver and watched quantities."""
     decided = json.loads(plan.attrs["planned"])
-    bare = variants.without(scene, variants.effects_by_name(scene, decided["gone"], f"{scene.name} [plan]"))
+    bare = variants.without_effects(scene, variants.effects_by_name(scene, decided["gone"], f"{scene.name} [plan]"))
     fewer = without_parts(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
     watch = [q.name for q in scene.watched_quantities() if q.is_there(owners)]
@@ -196,7 +196,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
         for k, q in enumerate(chosen):
             relative = asked[q.name].relative
             if relative is not None:  # the size of the quantity is known now
-                result["requested"][k] = relative * effect_size.size(one, q)
+                result["requested"][k] = relative * effect_size.reference_size(one, q)
         result["scatter"] = (("quantity",), [effect_size.scatter(one, q) for q in chosen])
         result.attrs |= {"full_evaluations": one.evaluations, "planned_evaluations": two.evaluations}
         requested = map(float, result["requested"].values)

@@ -37,7 +37,7 @@ def width(asked: int | None) -> int:
     """Return the number of workers; InputError for a number below one."""
     if asked is not None and asked < 1:
         raise InputError("--jobs", f"must be at least 1, not {asked}", "leave it out to use every core")
-    return asked or cores.cores()
+    return asked or cores.count_cores()
 
 
 def read(path: Path, settings: Sequence[str] = ()) -> tuple[Sweep, Scene]:

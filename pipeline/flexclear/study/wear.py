@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexclear.artifacts.labelled import LabelledArrays, of
+from flexclear.artifacts.labelled import LabelledArrays, label_dataset
 from flexclear.post.single_run.series import BANDS, SURFACES, spread_over_surface, surface_area
 from flexclear.scene.load import edited
 from flexclear.stages.graph import Graph
@@ -113,7 +113,7 @@ class Study:
         edits = {**worn_edits(self.joints, depths), "output.horizon": False}
         graph = Graph(edited(self.scene, edits), shown=False)
         (data,) = self.workplace.datasets(graph.simulate)
-        run = of(data)
+        run = label_dataset(data)
         worn = [str(name) for name in run["worn"].values]
         rates = {
             name: depths_of_run(run, worn.index(name), joint, depths[name]) / self.per_run

@@ -29,8 +29,6 @@ MOST_POINTS = 2_000_000
 #: what a reader quotes of a file
 _QUOTED = re.compile(r"(['\"]).*?\1")
 _GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
-#: bytes of the header of a VTK file that are examined
-HEADER = 2000
 #: largest number of files that an Abaqus file may include, counted as often as they are read
 MOST_INCLUDES = 1000
 #: characters forbidden in names of DOLFIN files: meshio searches for their parts by a pattern that contains the name
@@ -58,7 +56,7 @@ def require_file(path: Path, where: str) -> None:
 
 
 @contextlib.contextmanager
-def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> Any:
+def convert_reader_errors(path: Path, where: str, problem: str, remedy: str | None = None) -> Any:
     """Convert any error of a reader of this file to an InputError with `problem` and the reader's reason.
 
     Damaged files make readers fail in many ways. Too little memory becomes a ResourceError.
@@ -85,8 +83,8 @@ def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | 
     Raises ResourceError for larger files.
     """
     _require_mesh(path, where, largest)
-    with reading(path, where, problem, remedy):
-        opened = [path, *companions(path)]
+    with convert_reader_errors(path, where, problem, remedy):
+        opened = [path, *companion_files(path)]
         for file in opened:
             require_file(file, where)
             require_whole(file, where)
@@ -98,11 +96,12 @@ def _require_mesh(path: Path, where: str, largest: int | None) -> None:
     require_file(path, where)
     size = path.stat().st_size
     if largest is not None and size > largest:
-        raise InputError(where, f"'{path.name}' is larger than {machine.size(largest)}", "export it coarser")
+        raise InputError(where, f"'{path.name}' is larger than {machine.size_text(largest)}", "export it coarser")
     machine.require_memory(COPIES * size, f"{where}: '{path.name}'", "use a coarser mesh")
     if path.suffix == ".vtk":
         with path.open("rb") as file:
-            match = _GRID.search(file.read(HEADER))
+            # 2000: bytes of the header of a VTK file that are examined
+            match = _GRID.search(file.read(2000))
         count = prod(int(number) for number in match[1].split()) if match is not None else 0
         if count > MOST_POINTS:
             raise InputError(where, f"'{path.name}' declares a grid of {count:.3g} points, more than {MOST_POINTS}")
@@ -181,7 +180,7 @@ def _integers(data: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def companions(path: Path) -> Iterator[Path]:
+def companion_files(path: Path) -> Iterator[Path]:
     """Yield the files that meshio reads with this one: of TetGen, DOLFIN and XDMF, and nested includes of Abaqus.
 
     Callers that depend on a mesh file depend on these, too: their content decides the result as well. A file that

@@ -8,9 +8,9 @@ from functools import cache
 from pathlib import Path
 
 from flexclear.system.errors import ResourceError
-from flexclear.system.platforms import memory
+from flexclear.system.platforms import available_memory
 
-__all__ = ["disk", "instruction_set", "memory", "require_disk", "require_memory", "size"]
+__all__ = ["available_memory", "free_disk_space", "instruction_set", "require_disk", "require_memory", "size_text"]
 
 #: instruction sets that change the rounding of sums and products, by their names in LLVM
 INSTRUCTIONS = ("avx512f", "avx2", "fma", "neon", "sve")
@@ -21,31 +21,31 @@ CHOOSING = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT", "OPENBLAS_CORET
 ALLOWED_FRACTION = 0.8
 
 
-def disk(folder: Path) -> int:
+def free_disk_space(folder: Path) -> int:
     """Return the free space of the disk that holds, or will hold, a folder [bytes]."""
     return shutil.disk_usage(next(p for p in (folder, *folder.parents) if p.is_dir())).free
 
 
 def require_memory(need: float, what: str, remedy: str, limit: float | None = None) -> None:
     """Raise ResourceError when `what` needs more memory than `limit` [bytes]; default: a fraction of what is left."""
-    allowed = ALLOWED_FRACTION * memory() if limit is None else limit
+    allowed = ALLOWED_FRACTION * available_memory() if limit is None else limit
     if need > allowed:
         raise ResourceError(
-            f"{what} takes about {size(need)} of memory, more than the {size(allowed)} allowed; {remedy}"
+            f"{what} takes about {size_text(need)} of memory, more than the {size_text(allowed)} allowed; {remedy}"
         )
 
 
 def require_disk(need: float, what: str, folder: Path, remedy: str, limit: float | None = None) -> None:
     """Raise ResourceError when `what` needs more disk space than allowed [bytes]; limit: as in `require_memory`."""
-    allowed = ALLOWED_FRACTION * disk(folder) if limit is None else limit
+    allowed = ALLOWED_FRACTION * free_disk_space(folder) if limit is None else limit
     if need > allowed:
         raise ResourceError(
-            f"{what} takes about {size(need)} of disk space in {folder}, more than the {size(allowed)} allowed; "
-            f"{remedy}"
+            f"{what} takes about {size_text(need)} of disk space in {folder}, more than "
+            f"the {size_text(allowed)} allowed; {remedy}"
         )
 
 
-def size(count: float) -> str:
+def size_text(count: float) -> str:
     """Return a number of bytes in words: ``3.2 GB``."""
     power = next((k for k in range(5) if count < 1000.0 ** (k + 1)), 4)
     return f"{count / 1000.0**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"

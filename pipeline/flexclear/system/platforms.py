@@ -31,13 +31,13 @@ def _module(name: str) -> Any:
         return None
 
 
-def cores() -> int:
+def count_cores() -> int:
     """Return the number of processors that this process may use."""
     allowed = getattr(os, "sched_getaffinity", None)
     return len(allowed(0)) if allowed is not None else os.cpu_count() or 1
 
 
-def memory() -> int:
+def available_memory() -> int:
     """Return the memory that this process can still get [bytes]: least of machine, container and its own limit."""
     import psutil
 
@@ -136,7 +136,7 @@ def others_can_write(folder: Path, *, inside: bool) -> bool:
     return open_to_all or bool(inside and status.st_mode & stat.S_IWGRP) or status.st_uid not in (0, os.geteuid())
 
 
-def alive(process: int) -> bool:
+def is_alive(process: int) -> bool:
     """Return True when a process with this number runs, as far as this user can see."""
     import psutil
 

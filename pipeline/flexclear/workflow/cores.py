@@ -11,10 +11,10 @@ from threading import Event
 from typing import TypeVar
 
 from flexclear.system.errors import StoppedError
-from flexclear.system.platforms import cores
+from flexclear.system.platforms import count_cores
 from flexclear.system.progress import Progress, silent
 
-__all__ = ["cores", "free", "run_in_thread", "set_idle", "side_by_side", "width"]
+__all__ = ["concurrent_threads", "count_cores", "has_free_processor", "run_in_thread", "set_idle", "side_by_side"]
 
 Result = TypeVar("Result")
 #: time of one wait for a thread, after which Ctrl-C is checked [s]: some systems do not interrupt a wait
@@ -29,17 +29,17 @@ def set_idle(others_idle: bool) -> None:
     _others_idle = others_idle
 
 
-def free() -> bool:
+def has_free_processor() -> bool:
     """Return True when a processor is free, as far as this program knows; never in another program's workers."""
     known = sys.modules.get("multiprocessing.process")  # loaded in its workers; elsewhere the import would take 4 ms
     idle = (known is None or known.parent_process() is None) if _others_idle is None else _others_idle
-    return idle and cores() > 1
+    return idle and count_cores() > 1
 
 
-def width() -> int:
+def concurrent_threads() -> int:
     """Return the number of threads of compiled code to run concurrently."""
     # 4: number of threads while other tasks run, at most the number of cores: these tasks will end and free theirs
-    return cores() if free() else min(cores(), 4)
+    return count_cores() if has_free_processor() else min(count_cores(), 4)
 
 
 def side_by_side(
@@ -48,8 +48,8 @@ def side_by_side(
     """Return the results of work(0) .. work(count - 1) from threads; for compiled code, which runs concurrently.
 
     work: must call its progress callback from time to time; the call ends it when another thread has failed or Ctrl-C
-    was pressed. done: receives the number of finished results. threads: their number; default: `width`. Raises the
-    error of the first failure.
+    was pressed. done: receives the number of finished results. threads: their number; default: `concurrent_threads`.
+    Raises the error of the first failure.
     """
     from concurrent.futures import CancelledError, ThreadPoolExecutor
 
@@ -59,7 +59,7 @@ def side_by_side(
         if given_up.is_set():
             raise CancelledError
 
-    with ThreadPoolExecutor(min(threads or width(), count)) as pool:
+    with ThreadPoolExecutor(min(threads or concurrent_threads(), count)) as pool:
         waiting, results = [pool.submit(copy_context().run, work, k, progress) for k in range(count)], list[Result]()
         try:
             for future in waiting:
@@ -94,7 +94,7 @@ def run_in_thread(work: Callable[[Progress], Result]) -> Iterator[Callable[[], R
 
     result: Callable[[], Result] = partial(work, silent)
     with ThreadPoolExecutor(1) as pool:
-        if free():
+        if has_free_processor():
             with suppress(RuntimeError):  # no new thread: limit of a container, or the process is about to end
                 result = pool.submit(copy_context().run, work, alive).result
         try:

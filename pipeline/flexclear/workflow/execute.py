@@ -54,7 +54,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             load = store.arrays if hasattr(run, ARRAYS) else store.load
             data = {role: load(above) for role, above in inputs.items()}
             begun = store.path(task.stage, name, "part")
-            with threads.limit_to_one(), journal.storage(begun.parent, begun.stem) as storage:
+            with threads.limit_to_one(), journal.keep_journal(begun.parent, begun.stem) as storage:
                 product = run({**task.params, **task.context}, data, progress)
             changed = [fact for fact, value in contents(task).items() if known[fact] != value]
             if changed:
@@ -77,7 +77,7 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
-    last = store.last(task.folder, task.label)
+    last = store.last_shown(task.folder, task.label)
     now = _facts(task, fresh, sources)
     if last is None and stale:
         return State(task, None, ("never run",))

@@ -27,8 +27,6 @@ OWN = ("flexclear", "papers", "benchmarks")
 CORE = tuple(f"{OWN[0]}.{name}" for name in ("system", "numerics", "scene", "artifacts", "workflow"))
 #: suffixes of the files that count: modules, and what pages are made of
 COUNTED = (".py", ".css", ".js")
-#: attempts to parse a source, which concurrent threads of libraries may disturb
-ATTEMPTS = 10
 _PARSING = Lock()
 #: libraries that affect no result: locks, folders, remaining resources of the machine
 MACHINE = {"filelock", "platformdirs", "psutil"}
@@ -169,7 +167,8 @@ def _parse(source: bytes) -> ast.Module:
 
     This occurs at least in 3.11 and 3.12 (its issue 106905); runs, perturbed runs and ensemble members are threads.
     """
-    for _ in range(ATTEMPTS):
+    # 10: attempts to parse a source, which concurrent threads of libraries may disturb
+    for _ in range(10):
         with contextlib.suppress(SystemError), _PARSING:  # libraries parse as well, without this lock
             return ast.parse(source)
     return ast.parse(source)

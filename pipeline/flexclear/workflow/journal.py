@@ -87,13 +87,13 @@ class Journal:
 _current: ContextVar[Journal | None] = ContextVar("journal", default=None)
 
 
-def current() -> Journal | None:
+def current_journal() -> Journal | None:
     """Return the journal of the current task; None where nothing is stored."""
     return _current.get()
 
 
 @contextlib.contextmanager
-def storage(folder: Path, key: str) -> Iterator[Journal]:
+def keep_journal(folder: Path, key: str) -> Iterator[Journal]:
     """Yield the journal of a task, and write its pieces when the work fails or is stopped; the caller removes them."""
     journal = Journal(folder, key)
     before = _current.set(journal)

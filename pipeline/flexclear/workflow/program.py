@@ -14,11 +14,6 @@ from flexclear.system.errors import INTERRUPTED, FlexclearError, ResourceError, 
 from flexclear.system.platforms import plain_output, reader_has_gone
 from flexclear.workflow import workers
 
-CLOSED_PIPE = 141
-#: new objects before Python's garbage collector runs: a short command makes hardly any garbage, and spent a tenth of
-#: its time on collections
-GARBAGE = 200_000
-
 
 def exit_code(work: Callable[[], object], *, own: bool = True) -> int:
     """Do the work and return the exit code, as the command ``flexclear`` has them; errors are printed.
@@ -28,7 +23,9 @@ def exit_code(work: Callable[[], object], *, own: bool = True) -> int:
     plain_output()
     if own:
         signal.signal(signal.SIGTERM, _as_interrupt)
-        gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
+        # 200_000: new objects before Python's garbage collector runs: a short command makes hardly any garbage, and
+        # spent a tenth of its time on collections
+        gc.set_threshold(200_000, *gc.get_threshold()[1:])
         # at exit Python collects garbage several times over all objects: a sixth of the time of a short command, half a
         # second where something was compiled. Nobody gains by that, since the system takes all memory back
         atexit.register(gc.freeze)
@@ -50,7 +47,7 @@ def exit_code(work: Callable[[], object], *, own: bool = True) -> int:
             return ResourceError.exit_code
         # the reader (`| head`) has closed the pipe; keep the interpreter from reporting that at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return CLOSED_PIPE
+        return 141  # of a closed pipe, as shells count: 128 + SIGPIPE
     except (OSError, MemoryError) as error:  # errors of the machine that no other code described better
         print(f"flexclear: {terminal_text(str(error)) or 'there is not enough memory'}", file=sys.stderr)
         return ResourceError.exit_code

@@ -68,7 +68,7 @@ class _Running:
 
 @dataclass
 class _Plan:
-    """State of one call of `bring`: finished, failed and waiting tasks."""
+    """State of one call of `bring_up_to_date`: finished, failed and waiting tasks."""
 
     waiting: list[Task]
     tasks: tuple[Task, ...]
@@ -90,7 +90,9 @@ class _Plan:
                 self.waiting.remove(task)
 
 
-def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, jobs: int | None = None) -> Outcome:
+def bring_up_to_date(
+    tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, jobs: int | None = None
+) -> Outcome:
     """Bring tasks and all their inputs up to date; a failure stops only the tasks that depend on it.
 
     jobs: largest number of processes; default: the cores this process may use. On a request to stop (`stopping`), tasks
@@ -102,10 +104,10 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
     if plan.waiting:
         _fail_wrong(plan)
         for task in plan.waiting:
-            if store.last(task.folder, task.label) is not None:
+            if store.last_shown(task.folder, task.label) is not None:
                 store.mark_outdated(task.folder, task.label, UNFINISHED)
         monitor.start(len(plan.waiting))
-        width = min(jobs or cores.cores(), _largest_concurrency(plan.waiting))
+        width = min(jobs or cores.count_cores(), _largest_concurrency(plan.waiting))
         with stopping.request_at_interrupt(monitor.say):
             if width == 1:
                 _run_here(plan, store, sources, monitor)
@@ -166,8 +168,8 @@ def _run_here(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> 
         task = ready[0]
         plan.waiting.remove(task)
         name = monitor.begin(task.scene, task.label)
-        result = attempt(task, plan.inputs(task), store, sources, partial(monitor.update, name))
-        _note(plan, task, result)
+        result = attempt_task(task, plan.inputs(task), store, sources, partial(monitor.update, name))
+        _store_result(plan, task, result)
         monitor.finish(name, failed=isinstance(result, Failure))
         plan.give_up_below_failures()
 
@@ -175,11 +177,11 @@ def _run_here(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> 
 def _run_in_workers(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
     """Run the tasks in worker processes."""
     running: dict[Future[Record | Failure], _Running] = {}
-    with workers.team(width) as team, stopping.heed_requests():
+    with workers.worker_team(width) as team, stopping.heed_requests():
         while (plan.waiting or running) and not stopping.stop_reason():
             _submit(plan, running, team.pool, width, store, sources, monitor)
             _collect(plan, running, monitor)
-            _relay(team.channel, monitor)
+            _relay_reports(team.channel, monitor)
         if stopping.stop_reason():
             _end_in_good_order(plan, running, team.channel, monitor)
 
@@ -196,11 +198,11 @@ def _end_in_good_order(
         _, late = wait(running, timeout=TICK)
         if len(late) <= channel.unstoppable.value:
             break
-        _relay(channel, monitor)
+        _relay_reports(channel, monitor)
     for future, job in running.items():
         if future.done() and future.exception() is None:
             result = future.result()
-            _note(plan, job.task, result)
+            _store_result(plan, job.task, result)
             monitor.finish(job.name, failed=isinstance(result, Failure))
         else:
             plan.waiting.append(job.task)
@@ -211,7 +213,7 @@ def _end_in_good_order(
 def _leave_waiting(plan: _Plan, why: str) -> None:
     """Abandon all unfinished tasks when the command must stop, and report this once."""
     if plan.waiting:
-        code = stopping.error(why).exit_code
+        code = stopping.stopping_error(why).exit_code
         rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks were not run: {why}")
         plan.failed |= {task: rest for task in plan.waiting}
         plan.waiting.clear()
@@ -244,12 +246,12 @@ def _submit(
         name = monitor.begin(task.scene, task.label)
         record = find(task, inputs, store, sources)
         if record is not None:
-            _note(plan, task, record)
+            _store_result(plan, task, record)
             monitor.finish(name, failed=False)
             continue
         where = (store.root, sources.root, sources.memo)
         with workers.report_lost_worker():  # an idle worker may die
-            future = pool.submit(_work, task, inputs, name, where, others_idle)
+            future = pool.submit(_run_in_worker, task, inputs, name, where, others_idle)
         running[future] = _Running(task, key, name)
 
 
@@ -268,24 +270,24 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
                 plan.waiting.append(task)
                 continue
             raise ResourceError(f"{task.scene} {task.label}: {workers.LOST}") from None
-        _note(plan, task, result)
+        _store_result(plan, task, result)
         monitor.finish(name, failed=isinstance(result, Failure))
     plan.give_up_below_failures()
 
 
-def _relay(channel: workers.Channel, monitor: Monitor) -> None:
+def _relay_reports(channel: workers.Channel, monitor: Monitor) -> None:
     for news in channel.take_reports():
         monitor.update(*news)
 
 
-def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:
+def _store_result(plan: _Plan, task: Task, result: Record | Failure) -> None:
     if isinstance(result, Failure):
         plan.failed[task] = replace(result, task=task)  # the worker's result holds a copy of the task
     else:
         plan.done[task] = result
 
 
-def _work(
+def _run_in_worker(
     task: Task,
     inputs: Mapping[str, Record],
     name: str,
@@ -304,10 +306,10 @@ def _work(
             workers.report(name, fraction, text)
 
     with stopping.declare_task():
-        return attempt(task, inputs, Store(root, say=partial(progress, None)), sources_of(source, memo), progress)
+        return attempt_task(task, inputs, Store(root, say=partial(progress, None)), sources_of(source, memo), progress)
 
 
-def attempt(
+def attempt_task(
     task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress
 ) -> Record | Failure:
     """Return the record, or the failure with its message to the user. Unexpected errors are reported with their

@@ -28,7 +28,7 @@ _busy = False
 _conditions: list[tuple[Callable[[], bool], str]] = []
 
 
-def request(why: str) -> None:
+def request_stop(why: str) -> None:
     """Ask the work of this process to stop."""
     global _why
     _why = _why or why
@@ -39,19 +39,19 @@ def stop_reason() -> str:
     return _why or next((why for due, why in _conditions if due()), "")
 
 
-def check() -> None:
+def check_stop() -> None:
     """Raise StoppedError when the work must stop."""
     why = stop_reason()
     if why:
-        raise error(why)
+        raise stopping_error(why)
 
 
-def error(why: str, partial: LabelledArrays | None = None) -> StoppedError:
+def stopping_error(why: str, partial: LabelledArrays | None = None) -> StoppedError:
     """Return the error of work that stops for this reason. partial: arrays of a run up to the stop."""
     return StoppedError(why, partial, interrupted=why == INTERRUPTED)
 
 
-def heeds() -> bool:
+def heeds_stop_requests() -> bool:
     """Return True when the running work checks for requests."""
     return _heeded > 0
 
@@ -108,9 +108,9 @@ def request_at_interrupt(say: Callable[[str], None]) -> Iterator[None]:
         return
 
     def handle(number: int, frame: Any) -> None:
-        if not heeds() or _why:
+        if not heeds_stop_requests() or _why:
             raise KeyboardInterrupt
-        request(INTERRUPTED)
+        request_stop(INTERRUPTED)
         say("stopping after storing finished results; press Ctrl-C again to stop at once")
 
     ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
@@ -128,8 +128,8 @@ def obey_parent(wait_for_signal: Callable[[], Any], why: Callable[[], str], unst
 
     def wait() -> None:
         wait_for_signal()
-        request(why())
-        if _busy and not heeds():
+        request_stop(why())
+        if _busy and not heeds_stop_requests():
             unstoppable()
 
     threading.Thread(target=wait, daemon=True).start()

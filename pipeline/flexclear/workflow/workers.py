@@ -45,7 +45,7 @@ class Channel:
     reports: Any
 
     @staticmethod
-    def made() -> Channel:
+    def create() -> Channel:
         """Create a channel for the workers of one pool."""
         context = _context()
         return Channel(
@@ -93,14 +93,14 @@ def pool(width: int, channel: Channel | None = None) -> ProcessPoolExecutor:
     from concurrent.futures import ProcessPoolExecutor
 
     given = channel and replace(channel, ends=channel.ends[:1])
-    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(given,))
+    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_prepare_worker, initargs=(given,))
 
 
 #: in a worker: the channel of its pool
 _channel: Channel | None = None
 
 
-def _begin(channel: Channel | None) -> None:
+def _prepare_worker(channel: Channel | None) -> None:
     """Prepare a worker: it ends with its parent, and ignores Ctrl-C and SIGTERM, which the parent handles.
 
     Shells, schedulers of clusters and services send both to all processes of a command.
@@ -137,7 +137,7 @@ def _context() -> Any:
     return multiprocessing.get_context("spawn")
 
 
-def kill(workers: ProcessPoolExecutor) -> None:
+def kill_workers(workers: ProcessPoolExecutor) -> None:
     """End the workers at once; a compiled kernel does not react to interrupts."""
     for process in list((workers._processes or {}).values()):
         process.kill()
@@ -171,7 +171,7 @@ _reusing = 0
 
 @contextmanager
 def keep_workers() -> Iterator[None]:
-    """Keep workers alive between calls of `team` inside this context: starting and importing take a second.
+    """Keep workers alive between calls of `worker_team` inside this context: starting and importing take a second.
 
     Workers have the environment of their start, so a context is for one command.
     """
@@ -186,14 +186,14 @@ def keep_workers() -> Iterator[None]:
 
 
 @contextmanager
-def team(width: int) -> Iterator[Team]:
+def worker_team(width: int) -> Iterator[Team]:
     """Yield at least `width` workers; they are killed where the block fails or the work must stop."""
     with ExitStack() as stack:
         while _idle and _idle[-1].width < width:
             _idle.pop().pool.shutdown()
         # a team for reuse may serve a wider call later; workers that are never needed are never started
-        current = _idle.pop() if _idle else _team(max(width, cores.cores()) if _reusing else width)
-        stack.callback(kill, current.pool)
+        current = _idle.pop() if _idle else _start_team(max(width, cores.count_cores()) if _reusing else width)
+        stack.callback(kill_workers, current.pool)
         current.channel.take_reports()  # discards reports of the last call
         yield current
         if not stopping.stop_reason():
@@ -204,6 +204,6 @@ def team(width: int) -> Iterator[Team]:
                 current.pool.shutdown()
 
 
-def _team(width: int) -> Team:
-    channel = Channel.made()
+def _start_team(width: int) -> Team:
+    channel = Channel.create()
     return Team(width, pool(width, channel), channel)

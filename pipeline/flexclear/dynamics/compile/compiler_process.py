@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.dynamics.compile.files import file_lock, load_file
-from flexclear.workflow.cores import free
+from flexclear.workflow.cores import has_free_processor
 
 if TYPE_CHECKING:
     import subprocess
@@ -50,7 +50,7 @@ def is_useful() -> bool:
     """Return True when a second process is useful and can be started."""
     # a program packed into one file would start itself again
     startable = bool(sys.executable) and not getattr(sys, "frozen", False)
-    return startable and free()
+    return startable and has_free_processor()
 
 
 def _start(paths: list[Path]) -> subprocess.Popen[bytes] | None:

@@ -160,4 +160,4 @@ def schemes(scene: Scene) -> list[Scheme]:
 
 
 def _integrators(scene: Scene) -> tuple[str, ...]:
-    return integrators.by_need(bool(scene.flexible())) if scene.by_need() else (scene.solver.integrator,)
+    return integrators.selectable_integrators(bool(scene.flexible())) if scene.by_need() else (scene.solver.integrator,)

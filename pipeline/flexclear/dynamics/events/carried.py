@@ -16,7 +16,9 @@ from flexclear.dynamics.run.evaluation.start import NO_IMPACT
 from flexclear.scene.schema import Scene
 
 
-def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray, known: Mapping[str, float]) -> np.ndarray:
+def carry_internal_states(
+    old: Model, before: np.ndarray, new: Model, y: np.ndarray, known: Mapping[str, float]
+) -> np.ndarray:
     """Return state y of a new model with the internal states of its common parts from an old model's state `before`.
 
     These are angles with their turns, integral parts of controllers, rotation vectors and deflections of bristles.

@@ -56,7 +56,7 @@ def without_released_part(scene: Scene, event: Event) -> Scene:
         kind: {n: part for n, part in getattr(scene, kind).items() if not _acts_along(part, keys, name)}
         for kind, keys in ALONG.items()
     }
-    left["load"] = {n: load for n, load in left["load"].items() if not _reads(scene, n, name)}
+    left["load"] = {n: load for n, load in left["load"].items() if not _reads_joint(scene, n, name)}
     return scene.model_copy(update={"joint": {**scene.joint, name: free}, **left})
 
 
@@ -64,7 +64,7 @@ def _acts_along(part: Any, keys: tuple[str, ...], joint: str) -> bool:
     return any((getattr(part, key, None) or "").partition(".")[0] == joint for key in keys)
 
 
-def _reads(scene: Scene, load: str, joint: str) -> bool:
+def _reads_joint(scene: Scene, load: str, joint: str) -> bool:
     """Return True when a load by an expression reads a coordinate of a joint."""
     written = formula(scene, load)
     reads = written.reads if written else ()
@@ -110,7 +110,7 @@ def with_drives_of_event(scene: Scene, event: Event, held: Iterable[Held], at: M
         if event.kind == "switch":
             law = JointDrive.model_validate({"joint": one.joint, "law": (event.to or {})["law"]}).law
             begins = pieces_of(law, one.dimension).value(0.0)
-            law = Sum(type="sum", laws=(_later(law, t), Constant(type="constant", value=at[one.label] - begins)))
+            law = Sum(type="sum", laws=(_delay_laws(law, t), Constant(type="constant", value=at[one.label] - begins)))
         made[one.drive] = JointDrive(joint=one.joint, coordinate=one.coordinate, law=law)
     return scene.model_copy(update={"drive": {**scene.drive, **made}})
 
@@ -125,7 +125,7 @@ def with_switched_load(scene: Scene, event: Event, t: float) -> Scene:
     """Return the scene with a load switched at time t [s], which is time zero for the new laws and expressions."""
     name, keys = event.part[1], event.to or {}
     new = switched_part(scene.load[name], event)
-    changed = {key: _later(getattr(new, key), t) for key in keys}
+    changed = {key: _delay_laws(getattr(new, key), t) for key in keys}
     if isinstance(new, EXPRESSIONS) and "force" in keys:
         late = tuple(with_name(text, "t", f"(t - {t!r} s)") for text in new.texts)
         changed["force"] = late[0] if isinstance(new.force, str) else late
@@ -133,14 +133,16 @@ def with_switched_load(scene: Scene, event: Event, t: float) -> Scene:
     return scene.model_copy(update={"load": {**scene.load, name: new}})
 
 
-def _later(value: Any, by: float) -> Any:
+def _delay_laws(value: Any, by: float) -> Any:
     """Return a value of a part with the laws in it delayed by `by` [s]."""
     if isinstance(value, Constant):
         return value
     if isinstance(value, KINDS):
         return Delayed(type="delayed", by=by, law=value)
     if isinstance(value, tuple):
-        return tuple(_later(item, by) for item in value)
+        return tuple(_delay_laws(item, by) for item in value)
     if isinstance(value, Part):
-        return value.model_copy(update={name: _later(getattr(value, name), by) for name in type(value).model_fields})
+        return value.model_copy(
+            update={name: _delay_laws(getattr(value, name), by) for name in type(value).model_fields}
+        )
     return value

@@ -18,7 +18,7 @@ from flexclear.artifacts.labelled import LabelledArray, LabelledArrays
 from flexclear.artifacts.schema import RUN, conform_arrays
 from flexclear.dynamics.equations.observation import Observed
 from flexclear.dynamics.model.model import Model
-from flexclear.dynamics.record.dataset import attributes, recorded, subject
+from flexclear.dynamics.record.dataset import attributes, record_run, subject
 from flexclear.dynamics.run import ledger
 from flexclear.dynamics.run.run import Run
 from flexclear.scene.schema import Scene
@@ -87,7 +87,7 @@ def _energy_of_kernels_origin(model: Model) -> float:
 def join_phases(scene: Scene, phases: Sequence[Phase], notes: Sequence[str]) -> LabelledArrays:
     """Return the dataset of a run with events (schema RUN); notes: sentences for its warnings."""
     runs = [phase.run for phase in phases if phase.run is not None]
-    parts = [recorded(run) for run in runs]
+    parts = [record_run(run) for run in runs]
     names = {dim: _names(parts, dim) for dim in dict.fromkeys(d for data in parts for d in data.sizes)}
     made, gaps = dict[str, LabelledArray](), set[str]()
     for name in dict.fromkeys(n for data in parts for n in data.variables):

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexclear.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.dynamics.equations.observation import Observed
-from flexclear.dynamics.events.carried import carry, with_closed_contacts
+from flexclear.dynamics.events.carried import carry_internal_states, with_closed_contacts
 from flexclear.dynamics.events.changes import (
     coordinates_of_event,
     rates,
@@ -33,7 +33,7 @@ from flexclear.dynamics.run.run import Run, follow, maker, observe_run, require_
 from flexclear.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never
 from flexclear.dynamics.starts.snapshot import with_poses_and_velocities
 from flexclear.scene.events import Event
-from flexclear.scene.quantity import Quantity, condition
+from flexclear.scene.quantity import Quantity, parse_condition
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import InputError, SolverError, StoppedError, refuse
 from flexclear.system.progress import Progress
@@ -55,7 +55,7 @@ class _Start:
     before: tuple[Engine, np.ndarray] | None = None
 
 
-def simulated(
+def run_with_events(
     scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, judges: Judges | None = None
 ) -> LabelledArrays:
     """Return the run of a scene with events (schema RUN).
@@ -85,17 +85,17 @@ def simulated(
 
 def require_false(scene: Scene, engine: Engine, y: np.ndarray) -> None:
     """Raise InputErrors for events whose conditions are true in the state y at the start of the run."""
-    _refuse_true(Watch(engine, y, _conditions(scene, _due(scene.event)), {}), scene.event)
+    _refuse_true(Watch(engine, y, _conditions_of_events(scene, _due_events(scene.event)), {}), scene.event)
 
 
-def _due(waiting: Mapping[str, Event]) -> dict[str, Event]:
+def _due_events(waiting: Mapping[str, Event]) -> dict[str, Event]:
     """Return the events that wait for no other one."""
     return {name: event for name, event in waiting.items() if not event.before & waiting.keys()}
 
 
-def _conditions(scene: Scene, due: Mapping[str, Event]) -> dict[str, Quantity]:
+def _conditions_of_events(scene: Scene, due: Mapping[str, Event]) -> dict[str, Quantity]:
     owners = scene.owners()
-    return {name: condition(str(e.at), owners) for name, e in due.items() if not isinstance(e.at, float)}
+    return {name: parse_condition(str(e.at), owners) for name, e in due.items() if not isinstance(e.at, float)}
 
 
 def _refuse_true(watch: Watch, events: Mapping[str, Event]) -> None:
@@ -130,7 +130,7 @@ class _Plan:
     ) -> tuple[Phase, str | None, tuple[Scene, Engine, np.ndarray] | None]:
         """Return a phase, the event that ends it, and scene, engine and state there; both None in the last phase."""
         t, end = start.scene.time.start, self.scene.time.end
-        due = _due(waiting)
+        due = _due_events(waiting)
         timed = {n: max(e.at, t) for n, e in due.items() if isinstance(e.at, float)}
         first = min(timed, key=timed.__getitem__, default=None)
         until = end if first is None else timed[first]
@@ -143,8 +143,8 @@ class _Plan:
         mended = tuple(mends(engine, y)) if start.before is None else ()
         known = before[-1].coordinates if before else {}
         if start.before is not None:
-            y = carry(start.before[0].model, start.before[1], engine.model, y, known)
-        conditions = _conditions(self.scene, due)
+            y = carry_internal_states(start.before[0].model, start.before[1], engine.model, y, known)
+        conditions = _conditions_of_events(self.scene, due)
         watch = Watch(engine, y, conditions, known)
         begins = _energies(engine, y, t)
         phase = Phase(None, t, begins, begins, watch.coordinates)

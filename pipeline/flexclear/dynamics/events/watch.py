@@ -101,7 +101,7 @@ class Watch:
             return begin
         for _ in range(CLOSER_LOOKS):
             times = np.linspace(begin, end, PARTS + 1)
-            inner = self._between(row, times)
+            inner = self._rows_from(row, times)
             every = self._joined(known, self._observed(inner))
             values = self._values(every, np.append(self._rows[: k + 1, 0], times))[name][-len(times) :]
             after = np.flatnonzero((values[1:] > 0.0) & ~(values[:-1] > 0.0))
@@ -114,7 +114,7 @@ class Watch:
             return None
         return begin - low / (high - low) * (end - begin) if np.isfinite(low) else end
 
-    def _between(self, row: np.ndarray, times: np.ndarray) -> np.ndarray:
+    def _rows_from(self, row: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return rows at these times, integrated from a row."""
         engine = copy_of_engine(self._engine)
         first = recording.record(row, len(engine.model.contacts))

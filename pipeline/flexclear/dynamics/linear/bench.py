@@ -30,9 +30,6 @@ from flexclear.system.progress import Progress
 
 Pose = TypeVar("Pose")
 
-#: drives reach the requested pose in steps of this fraction of the mechanism's size, or this angle
-STRIDE = 0.05
-
 
 @dataclass(frozen=True)
 class Bench:
@@ -156,7 +153,7 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
 
 
 @contextmanager
-def moved_on(bench: Bench, duration: float) -> Iterator[Bench]:
+def advance_drives(bench: Bench, duration: float) -> Iterator[Bench]:
     """Yield the bench with its drives as they are after a duration [s] at constant speed."""
     drives = bench.drives.copy()
     drives[:, 0] += duration * drives[:, 1]
@@ -174,12 +171,13 @@ def move_drives(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     origin = bench.drives[:, 0]
     way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
 
-    def at(fraction: float, start: np.ndarray) -> np.ndarray:
+    def positions_at(fraction: float, start: np.ndarray) -> np.ndarray:
         set_drives(bench, np.stack([origin + fraction * (target - origin), 0.0 * target], axis=1))
         return close(bench, start)
 
     # smallest step, as a fraction of the whole way, before the pose counts as out of reach
-    return approach_in_steps(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, 1e-4)
+    # 0.05: drives reach the requested pose in steps of this fraction of the mechanism's size, or this angle
+    return approach_in_steps(positions_at, q, min(1.0, 0.05 / way) if way > 0.0 else 1.0, 1e-4)
 
 
 def approach_in_steps(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, shortest: float) -> Pose:

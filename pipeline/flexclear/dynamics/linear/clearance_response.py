@@ -59,7 +59,7 @@ FINITE = 1e-3
 OF_POSE = ("position", "orientation")
 
 
-def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Mapping[str, float]]:
+def bound_effects(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Mapping[str, float]]:
     """Return the largest effects of a scene's clearances over its motion, in SI, by joint, of each quantity.
 
     run: of its ideal mechanism.  Only those of `chosen` that follow from the pose are bounded.
@@ -270,7 +270,7 @@ def curvature(
 
     def residuals(move: np.ndarray) -> np.ndarray:
         moved = displaced_poses(model.mechanism, poses, move[:m])
-        return misfit(model.mechanism, _bent(model, joints, bundles, move[m:]), moved).values
+        return misfit(model.mechanism, _displace_joints(model, joints, bundles, move[m:]), moved).values
 
     closed = misfit(model.mechanism, joints, poses).values  # to the tolerance of the run
     # fraction of the largest motion below which the square of a motion, a thousandth of the largest square, is left out
@@ -300,7 +300,7 @@ def _ends(bundle: Labelled, length: float) -> np.ndarray:
     return np.vstack([shape.reshape(-1, shape.shape[-1]) for shape in shapes])
 
 
-def _bent(
+def _displace_joints(
     model: Model, joints: Sequence[Constraint], bundles: Mapping[str, Labelled], q: np.ndarray
 ) -> list[Constraint]:
     """Return the joints with their frames displaced on their links by the elastic coordinates of all bodies."""

@@ -13,7 +13,7 @@ from flexclear.dynamics.linear.bench import Bench, observe, rows, state
 from flexclear.dynamics.linear.equilibrium import Equilibrium
 from flexclear.dynamics.linear.shapes import motions
 from flexclear.dynamics.linear.vibrations import Vibrations
-from flexclear.dynamics.record.dataset import attributes, recorded, subject
+from flexclear.dynamics.record.dataset import attributes, record_run, subject
 from flexclear.dynamics.run.refusals import validity
 from flexclear.dynamics.run.run import Run
 from flexclear.dynamics.run.trajectory import Trajectory
@@ -28,7 +28,7 @@ def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
     contacts, none = len(bench.model.contacts), m.named(m.EVENT, np.zeros((0, m.EVENT.size)))[:, 0]
     row = rows(bench, seen.state)
     once = Trajectory(row, row[:0], none, contacts, {}, ((bench.time, bench.engine.selected.copy()),))
-    still = recorded(Run(bench.scene, bench.engine, once, seen)).to_xarray().isel(time=0, drop=True)
+    still = record_run(Run(bench.scene, bench.engine, once, seen)).to_xarray().isel(time=0, drop=True)
     kept = [n for n in EQUILIBRIUM if n in still.variables]
     names = [n for n in still.coords if set(still[n].dims) <= set().union(*(still[k].dims for k in kept))]
     result = still[kept].assign_coords({n: still[n].variable for n in names})

@@ -27,11 +27,11 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics.linear.bench import (
     Bench,
+    advance_drives,
     approach_in_steps,
     balance,
     close,
     hold,
-    moved_on,
     set_drives,
 )
 from flexclear.dynamics.linear.floquet import PROBE, small_motions
@@ -52,8 +52,6 @@ LONGEST_MOVE = 0.2
 BALANCED, SHORT_MOVE = 1e-12, 1e-14
 #: relative unbalanced force that counts as rounding when iterations stop improving
 STALLED = 1e-8
-#: returns of unheld motions to where they began, which converge quadratically
-RETURNS = 4
 #: eigenvalues of the stiffness below this fraction of the largest count as zero
 NO_STIFFNESS = 1e-12
 #: corrections of one pose; each must be at most this fraction of the one before, else the step of the speed is halved
@@ -80,8 +78,9 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
 
     Motions that nothing holds there, such as that of a roller about its pin, end where they began.
     """
-    rest = _descended(bench, tangent(bench, q))
-    for _ in range(RETURNS):
+    rest = _follow_forces(bench, tangent(bench, q))
+    # 4: returns of unheld motions to where they began, which converge quadratically
+    for _ in range(4):
         at = rest.at
         K, _ = stiffness(bench, at, at.Z)
         k, axes = np.linalg.eigh(0.5 * (K + K.T))
@@ -89,11 +88,11 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
         back = free @ (free.T @ at.mass @ np.linalg.lstsq(at.moves, q - at.q, rcond=None)[0])
         if not SHORT_MOVE < np.max(np.abs(back) / bench.model.speed_scales, initial=0.0) < LONGEST_MOVE:
             break
-        rest = _descended(bench, tangent(bench, close(bench, at.q + at.moves @ back)))
+        rest = _follow_forces(bench, tangent(bench, close(bench, at.q + at.moves @ back)))
     return rest
 
 
-def _descended(bench: Bench, at: Tangent) -> Equilibrium:
+def _follow_forces(bench: Bench, at: Tangent) -> Equilibrium:
     """Return the equilibrium to which forces lead from a pose."""
     best, since = np.inf, 0
     for iteration in range(MOST_MOVES):
@@ -303,7 +302,7 @@ def _is_steady(bench: Bench, at: Tangent) -> bool:
     loops = float(np.max(np.abs(before.slip) / units, initial=0.0))
     if loops > STEADY * fastest:
         return False
-    with moved_on(bench, PROBE / fastest) as later:
+    with advance_drives(bench, PROBE / fastest) as later:
         after = balance(later, at.q)
         forces = max(forces, after.moment)
     change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))

@@ -18,7 +18,7 @@ from math import gcd
 
 import numpy as np
 
-from flexclear.dynamics.linear.bench import Bench, moved_on
+from flexclear.dynamics.linear.bench import Bench, advance_drives
 from flexclear.dynamics.linear.shapes import motions
 from flexclear.dynamics.linear.tangent import Tangent, tangent
 from flexclear.dynamics.linear.vibrations import (
@@ -76,15 +76,15 @@ def small_motions(bench: Bench, at: Tangent) -> Vibrations:
         return vibrations(bench, at)
     here = equations(bench, at, principal_motions(bench, at))
     first = Instant(here, np.eye(len(here.K)))
-    if _differ(first, _after(bench, at, here, PROBE / bench.fastest), here.scale):
+    if _differ(first, _equations_after(bench, at, here, PROBE / bench.fastest), here.scale):
         return _floquet(bench, at, first)
     return time_invariant_motions(here)
 
 
-def _after(bench: Bench, at: Tangent, here: Equations, duration: float) -> Instant:
+def _equations_after(bench: Bench, at: Tangent, here: Equations, duration: float) -> Instant:
     """Return the equations along the motions of `here` after the drives have moved for a duration [s]."""
     along = here.motions
-    with moved_on(bench, duration) as later:
+    with advance_drives(bench, duration) as later:
         there = tangent(later, at.q)
         heavy = there.mass @ along
         left = along - there.Z @ (there.Z.T @ heavy)
@@ -103,7 +103,7 @@ def _after(bench: Bench, at: Tangent, here: Equations, duration: float) -> Insta
 
 def _frames_after(bench: Bench, at: Tangent, along: np.ndarray, duration: float) -> np.ndarray:
     """Return displacements of frames, and rotations times the mechanism's size, in world axes per motion, (many, n)."""
-    with moved_on(bench, duration) as later:
+    with advance_drives(bench, duration) as later:
         translation, rotation, _ = motions(later, at.q, along)
     moves = np.concatenate([translation, bench.model.length * rotation], axis=1).real
     return moves.reshape(along.shape[1], -1).T
@@ -124,7 +124,7 @@ def _period(bench: Bench, at: Tangent, first: Instant) -> float:
     turns = [p.dimension == "angle" for p in prescribed_coordinates(bench.model.scene)]
     speeds = np.abs(bench.drives[turns, 1])
     period = float(2.0 * np.pi / np.min(speeds[speeds > 0.0], initial=np.inf))
-    if not period or _differ(first, _after(bench, at, first.of, period), first.of.scale):
+    if not period or _differ(first, _equations_after(bench, at, first.of, period), first.of.scale):
         raise SolverError(
             f"at t = {bench.time:.6g} s: the equations of small motions change with the drives and are not the same "
             "after a turn; hold the drives instead, or drive what turns directly"
@@ -132,12 +132,16 @@ def _period(bench: Bench, at: Tangent, first: Instant) -> float:
     return period
 
 
-def _turn(bench: Bench, at: Tangent, here: Equations, period: float) -> tuple[list[Instant], dict[int, np.ndarray]]:
+def _equations_over_turn(
+    bench: Bench, at: Tangent, here: Equations, period: float
+) -> tuple[list[Instant], dict[int, np.ndarray]]:
     """Return the equations at enough angles of a turn, and the harmonics of A that are not negligible."""
     instants, count = list[Instant](), FEWEST_ANGLES
     while count <= MOST_ANGLES:
         known, step = instants, period / count
-        instants = [known[j // 2] if known and j % 2 == 0 else _after(bench, at, here, step * j) for j in range(count)]
+        instants = [
+            known[j // 2] if known and j % 2 == 0 else _equations_after(bench, at, here, step * j) for j in range(count)
+        ]
         A, wrong = (np.array(of) for of in zip(*(each.first_order(here.scale) for each in instants), strict=True))
         limit = _negligible(A, wrong).max(axis=0)
         harmonics = {k: part for k, part in _harmonics(A).items() if k == 0 or not np.all(np.abs(part) <= limit)}
@@ -160,7 +164,7 @@ def _floquet(bench: Bench, at: Tangent, first: Instant) -> Vibrations:
     """Return the small motions with frequencies in fixed axes."""
     here, n = first.of, len(first.mass)
     period = _period(bench, at, first)
-    instants, harmonics = _turn(bench, at, here, period)
+    instants, harmonics = _equations_over_turn(bench, at, here, period)
     moving, base = np.any([each.acting for each in instants], axis=0), gcd(*harmonics) or 1
     kept, scale = np.ix_(np.tile(moving, 2), np.tile(moving, 2)), here.scale[moving]
     blocks = {k // base: part[kept] for k, part in harmonics.items()}

@@ -21,7 +21,7 @@ from flexclear.artifacts.schema import STATE_SPACE, conform
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.linear.bench import Bench, close, observe, state
 from flexclear.dynamics.linear.equilibrium import Equilibrium
-from flexclear.dynamics.linear.tangent import EPSILON, Tangent, changed, stiffness, tangent
+from flexclear.dynamics.linear.tangent import EPSILON, Tangent, change_rates, stiffness, tangent
 from flexclear.dynamics.linear.vibrations import equations, principal_motions
 from flexclear.dynamics.model.driving import joint_type, label
 from flexclear.dynamics.model.interface_basis import modes_of
@@ -29,12 +29,12 @@ from flexclear.dynamics.model.loads import describe
 from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.record.dataset import attributes, series, subject
 from flexclear.dynamics.record.motion import Motions
-from flexclear.dynamics.sensitivity.parameters import central
+from flexclear.dynamics.sensitivity.parameters import central_difference
 from flexclear.dynamics.specialise import dual
 from flexclear.scene.loads import SampledPid
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene
-from flexclear.scene.units import exponents, si
+from flexclear.scene.units import exponents, si_unit
 from flexclear.system.errors import InputError, SolverError
 
 #: steps of differences, in natural units
@@ -97,7 +97,7 @@ class Directions:
         for row, one in zip(laws, self.inputs, strict=True):
             row[one.number * m.LAW.size + (m.LAW.rate if one.of_rate else m.LAW.value)] = 1.0
         still, same = np.zeros((len(laws), states.shape[1])), np.zeros((len(states), laws.shape[1]))
-        rates = changed(self.bench, self.at.q, np.vstack([states, still]), laws=np.vstack([same, laws]))
+        rates = change_rates(self.bench, self.at.q, np.vstack([states, still]), laws=np.vstack([same, laws]))
         count = len(states) + len(laws)
         forces = dual.changes(rates[model.speeds], count) @ modes_of(model.arrays).T
         return forces, dual.changes(rates[self.inner], count)
@@ -127,7 +127,7 @@ def state_space(bench: Bench, rest: Equilibrium, outputs: Sequence[Quantity]) ->
     """Return the matrices about an equilibrium (schema STATE_SPACE)."""
     model, inputs = bench.model, _inputs(bench.model)
     inner = _inner(Directions(bench, rest.at, rest.at.Z, np.arange(model.speeds.stop, model.ny), inputs))
-    at = _settled(bench, rest.at, inner)
+    at = _settle_internal_states(bench, rest.at, inner)
     A, motions, coordinates = _free(bench, at)
     n = len(coordinates)
     along = Directions(bench, at, motions, inner, inputs)
@@ -138,7 +138,7 @@ def state_space(bench: Bench, rest: Equilibrium, outputs: Sequence[Quantity]) ->
     lower = np.hstack([A, pushed[:, 2 * n : first]])
     A = np.vstack([np.eye(n, first, n), lower, rates[:first].T])
     B = np.vstack([np.zeros((n, len(inputs))), pushed[:, first:], rates[first:].T])
-    value, changes = _observed(along, outputs)
+    value, changes = _observe_outputs(along, outputs)
     used = [k for k, one in enumerate(inputs) if not one.of_rate or B[:, k].any()]
     names = [(c.name, c.unit) for c in coordinates]
     states = [*names, *((f"{name} rate", f"{unit}/s") for name, unit in names), *(_internal(model, k) for k in inner)]
@@ -183,7 +183,7 @@ def _inner(every: Directions) -> np.ndarray:
     return every.inner[felt & np.any(rates[kept] != 0.0, axis=0)]
 
 
-def _settled(bench: Bench, at: Tangent, inner: np.ndarray) -> Tangent:
+def _settle_internal_states(bench: Bench, at: Tangent, inner: np.ndarray) -> Tangent:
     """Return the pose where internal states, which are set, stay as well; raise SolverError when none is found."""
     first, own = 0.0, inner - bench.model.ny + len(bench.internal)
     for _ in range(CORRECTIONS if len(inner) else 0):
@@ -237,7 +237,7 @@ def _inputs(model: Model) -> list[Input]:
             key = path.strip("[]").removeprefix(f"load.{RELEASED}")
             key = f"drive.{key}" if name.startswith(RELEASED) else key
             key += f".{'xyz'[k]}" if len(laws) == 3 else ""
-            unit, number = si(exponents(dimension)), int(load["law0"]) + k
+            unit, number = si_unit(exponents(dimension)), int(load["law0"]) + k
             inputs += [Input(key, unit, number), Input(f"{key} rate", f"{unit}/s", number, of_rate=True)]
     return inputs
 
@@ -253,7 +253,7 @@ def _internal(model: Model, k: int) -> tuple[str, str]:
 
 def _force(model: Model, load: str) -> str:
     coordinate = describe(model.scene, load).coordinate
-    return "" if coordinate is None else si(exponents(coordinate.force))
+    return "" if coordinate is None else si_unit(exponents(coordinate.force))
 
 
 def _components(quantity: Quantity) -> list[str]:
@@ -262,7 +262,7 @@ def _components(quantity: Quantity) -> list[str]:
     return [f"{quantity.name}.{one}".rstrip(".") for one in letters]
 
 
-def _observed(along: Directions, outputs: Sequence[Quantity]) -> tuple[np.ndarray, np.ndarray]:
+def _observe_outputs(along: Directions, outputs: Sequence[Quantity]) -> tuple[np.ndarray, np.ndarray]:
     """Return values of outputs, and their derivatives along the directions, shape (directions, outputs)."""
     bench, model = along.bench, along.bench.model
     y = state(bench, along.at.q)
@@ -298,7 +298,7 @@ def _slope(values: Callable[[np.ndarray], np.ndarray], unit: float) -> np.ndarra
     rows = values(np.outer(steps, at).ravel()).reshape(len(steps), 4, -1)
     best, least = np.zeros(rows.shape[2]), np.full(rows.shape[2], np.inf)
     for step, row in zip(steps, rows, strict=True):
-        change = central(dict(zip(at, row, strict=True)), step)
+        change = central_difference(dict(zip(at, row, strict=True)), step)
         error = np.abs(change - (row[2] - row[1]) / (2.0 * step)) + EPSILON * np.abs(row).max(axis=0) / step
         best, least = np.where(error < least, change, best), np.minimum(error, least)
     return np.where(np.abs(best) <= ZERO_ENTRY * least, 0.0, best)

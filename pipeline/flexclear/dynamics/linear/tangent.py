@@ -140,11 +140,11 @@ def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multiplie
     directions: changes of the state, (directions, NY).  multipliers: constant, (rows,).  Raises SolverError where the
     equations are singular.
     """
-    rates = changed(bench, q, directions, multipliers)
+    rates = change_rates(bench, q, directions, multipliers)
     return dual.changes(rates[bench.model.speeds], len(directions)) @ modes_of(bench.model.arrays).T
 
 
-def changed(
+def change_rates(
     bench: Bench,
     q: np.ndarray,
     directions: np.ndarray,

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexclear.artifacts.labelled import Labelled, of
+from flexclear.artifacts.labelled import Labelled, label_dataset
 from flexclear.dynamics.model.closing import close
 from flexclear.dynamics.model.constraints import Constraint, demands
 from flexclear.dynamics.model.mechanism import Mechanism, build
@@ -91,7 +91,7 @@ def _rebuilt(mechanism: Mechanism, moved: Mapping[str, Mapping[str, Placement]])
 
 def _with_frames_at(bundle: Labelled, places: Mapping[str, Placement]) -> Labelled:
     """Return a bundle with frames at these places in the undeformed body."""
-    arrays = of(bundle)
+    arrays = label_dataset(bundle)
     position, rotation = (arrays[name].values.copy() for name in ("frame_position", "frame_rotation"))
     for k, frame in enumerate(arrays["frame"].values.tolist()):
         if frame in places:

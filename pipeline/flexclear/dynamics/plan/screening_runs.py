@@ -21,7 +21,7 @@ from flexclear.scene.integrators import DEFAULT
 from flexclear.scene.load import edited
 from flexclear.scene.quantity import Quantity
 from flexclear.scene.schema import Scene
-from flexclear.scene.variants import Effect, effects, with_modes, without
+from flexclear.scene.variants import Effect, effects, with_modes, without_effects
 from flexclear.system.errors import EVALUATIONS as TAKES_LONG
 from flexclear.system.errors import SolverError
 from flexclear.system.progress import Progress
@@ -104,7 +104,7 @@ class ScreeningRuns:
         """Return the scene without some effects and those within them, with the integration of screening runs."""
         names = self._names(dropped)
         if (names, self.refused_loose) not in self._variants:
-            bare = without(self.scene, [effect for effect in self.all_effects if effect.name in names])
+            bare = without_effects(self.scene, [effect for effect in self.all_effects if effect.name in names])
             self._variants[names, self.refused_loose] = self._with_solver(bare)
         return self._variants[names, self.refused_loose]
 

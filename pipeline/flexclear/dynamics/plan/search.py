@@ -18,7 +18,7 @@ import xarray as xr
 from flexclear.artifacts import effect_size
 from flexclear.artifacts.labelled import Labelled
 from flexclear.artifacts.points import Point
-from flexclear.dynamics.linear.clearance_response import OF_POSE, bounds
+from flexclear.dynamics.linear.clearance_response import OF_POSE, bound_effects
 from flexclear.dynamics.linear.response import Response, response
 from flexclear.dynamics.plan.budget import BUDGET, UNCHANGED, Integration, Search, possible_increase, upper_bounds
 from flexclear.dynamics.plan.impacts import choose_with_contacts, decide_bending
@@ -109,9 +109,9 @@ def _requested_accuracies(
                 raise SolverError(f"{scene.name}: a simpler mechanism cannot be run: {point.refused}")
             if _has_quantity(point, q):
                 break
-        sizes[q.name] = effect_size.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
+        sizes[q.name] = effect_size.reference_size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
         want = scene.accuracy.quantities[q.name]
-        if want.absolute is None and sizes[q.name] <= effect_size.rounding(point, q):
+        if want.absolute is None and sizes[q.name] <= effect_size.rounding_threshold(point, q):
             constant.append(q.name)
         else:
             accuracies[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
@@ -126,7 +126,7 @@ def _requested_accuracies(
     if all(accuracies[name] >= size for name, size in sizes.items()):
         # forces and rates may come from impacts alone
         more = simpler[1 if scene.contacts() or scene.stops() else 0]()
-        there = {q.name: effect_size.size(more, q) for q in quantities if _has_quantity(more, q)}
+        there = {q.name: effect_size.reference_size(more, q) for q in quantities if _has_quantity(more, q)}
         sizes = {name: max(size, there.get(name, 0.0)) for name, size in sizes.items()}
     if all(accuracies[name] >= size for name, size in sizes.items()):
         q = quantities[0]
@@ -161,7 +161,7 @@ def _decide_clearances(search: Search, loose: Sequence[Effect], soft: Sequence[E
         return
     runs, bounded = search.runs, dict[str, Mapping[str, float]]()
     if rigid is not None and any(q.kind in OF_POSE for q in runs.chosen):
-        bounded = dict(bounds(runs.scene, rigid, runs.chosen))
+        bounded = dict(bound_effects(runs.scene, rigid, runs.chosen))
     reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
     total = sum_by_quantity(reach.values(), search.requested)
     if search.fits(total, BY_BOUND):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from flexclear.dynamics.record.dataset import recorded
+from flexclear.dynamics.record.dataset import record_run
 from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.ledger import require_closed
 from flexclear.dynamics.run.run import Run, engines, follow, observe_run, rows_to_judge
@@ -57,30 +57,30 @@ def measure(
     def integrate() -> None:
         runs.append(follow(engine, start, silent if runs else progress, other))
 
-    first = _once(integrate)
+    first = _time_once(integrate)
     last, trajectory, switched = runs[0]
     seen = observe_run(last, trajectory)
     if checked:
         require_closed(last.model, *rows_to_judge(last, trajectory, seen))
 
     def record() -> xr.Dataset:
-        return recorded(Run(scene, last, trajectory, observe_run(last, trajectory), None, switched)).to_xarray()
+        return record_run(Run(scene, last, trajectory, observe_run(last, trajectory), None, switched)).to_xarray()
 
-    run, recording = record(), _repeated(record, 0)
-    return Cost(run, _repeated(integrate, MOST_REPEATS, (first,)), recording, engine.model.length)
+    run, recording = record(), _repeat_timing(record, 0)
+    return Cost(run, _repeat_timing(integrate, MOST_REPEATS, (first,)), recording, engine.model.length)
 
 
-def _repeated(task: Callable[[], object], most: int, first: tuple[float, ...] = ()) -> tuple[float, ...]:
+def _repeat_timing(task: Callable[[], object], most: int, first: tuple[float, ...] = ()) -> tuple[float, ...]:
     """Return processor times [s] of a task, `first` among them: REPEATS, or up to `most` of a short one."""
     seconds = [*first]
     while not seconds or (sum(seconds) < LONG_RUN and len(seconds) < REPEATS):
-        seconds.append(_once(task))
+        seconds.append(_time_once(task))
     while len(seconds) < most and sum(seconds) < ENOUGH_TIME:
-        seconds.append(_once(task))
+        seconds.append(_time_once(task))
     return tuple(seconds)
 
 
-def _once(task: Callable[[], object]) -> float:
+def _time_once(task: Callable[[], object]) -> float:
     begun = process_time()
     task()
     return process_time() - begun

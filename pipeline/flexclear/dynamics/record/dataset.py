@@ -20,7 +20,7 @@ from flexclear.dynamics.model.model import Model
 from flexclear.dynamics.model.plausibility import doubts
 from flexclear.dynamics.model.stops import ends_an_angle
 from flexclear.dynamics.record import bushings, controllers, films, frame_loads, gears, joint_friction, stress, wear
-from flexclear.dynamics.record.motion import Motions, motion_series, shifted
+from flexclear.dynamics.record.motion import Motions, motion_series, points_in_world
 from flexclear.dynamics.record.topology import topology
 from flexclear.dynamics.record.wrenches import every_joint_wrench, held_moments
 from flexclear.dynamics.run import ledger
@@ -34,7 +34,7 @@ from flexclear.scene.schema import Scene
 from flexclear.workflow.fingerprint import library_version
 
 
-def recorded(run: Run) -> LabelledArrays:
+def record_run(run: Run) -> LabelledArrays:
     """Return all recorded variables of a run (schema RUN)."""
     model, trajectory = run.model, run.trajectory
     motions = Motions(model, run.observed)
@@ -259,7 +259,7 @@ def _motion(
         dims = ("time", "joint", "axis")
         yield {"joint_moment": (dims, moment), "joint_force": (dims, force)}, {"joint": joints}
     if frames is not None:
-        places = shifted(motions.positions(frames), origin)
+        places = points_in_world(motions.positions(frames), origin)
         yield {"frame_position": (("time", "frame", "axis"), places)}, {"frame": frames}
 
 

@@ -37,7 +37,7 @@ from flexclear.scene.schema import Ensemble, Scene
 from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress
 from flexclear.workflow import journal
-from flexclear.workflow.cores import side_by_side, width
+from flexclear.workflow.cores import concurrent_threads, side_by_side
 
 if TYPE_CHECKING:
     from flexclear.artifacts.labelled import Labelled
@@ -72,10 +72,10 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     jacobian = offset_jacobian(engine, start)
     offsets = ball_offsets(engine.model, requested, requested.members)
     starts = [perturbed_start(engine, start, jacobian, moved) for moved in offsets]
-    making, judges, stored = Lock(), affordable(scene), journal.current()
+    making, judges, stored = Lock(), affordable(scene), journal.current_journal()
     piece = digest(engine, *starts) if stored is not None else ""
 
-    def heir(name: str) -> Engine:
+    def next_engine(name: str) -> Engine:
         with making:
             return copy_of_engine(other(name))
 
@@ -83,13 +83,13 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         """Run a member with an engine of its own, so that the result does not depend on previous members."""
         mine = copy_of_engine(engine)
         mine.specialised.place = place
-        last, trajectory, switched = follow(mine, starts[k], alive, heir, judges and judges.run)
+        last, trajectory, switched = follow(mine, starts[k], alive, next_engine, judges and judges.run)
         return _member(last, trajectory, names) | {"switched": np.array(switched)}
 
     def done(k: int) -> None:
         progress(k / requested.members, f"member {k} of {requested.members}")
 
-    places = places_of(engine, requested.members, width(), progress)
+    places = places_of(engine, requested.members, concurrent_threads(), progress)
 
     def member(k: int, alive: Progress) -> Member:
         name = f"member-{k}-{piece}"

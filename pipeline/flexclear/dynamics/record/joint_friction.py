@@ -23,25 +23,25 @@ def friction_series(model: Model, seen: Observed) -> Series:
     size = bearings["load"]
     wrench = {half: size[..., None] * bearings[f"unit_{half}"] for half in ("moment", "force")}
     middle = seen.sites[:, joints["site_b"]]["origin"]
-    force, moment = _summed(joints, wrench["force"]), _summed(joints, wrench["moment"])
-    slip = np.stack([bearings["slip"][:, _mine(row)].max(axis=1) for row in joints], axis=1)
+    force, moment = _sum_bearings(joints, wrench["force"]), _sum_bearings(joints, wrench["moment"])
+    slip = np.stack([bearings["slip"][:, _bearings_of(row)].max(axis=1) for row in joints], axis=1)
     dims = ("time", "rubbing")
     return {
-        "joint_bearing_load": (dims, _summed(joints, size)),
+        "joint_bearing_load": (dims, _sum_bearings(joints, size)),
         "joint_sliding_speed": (dims, slip),
-        "joint_friction_power": (dims, _summed(joints, -size * bearings["loss"])),
+        "joint_friction_power": (dims, _sum_bearings(joints, -size * bearings["loss"])),
         "joint_friction_force": ((*dims, "axis"), force),
         "joint_friction_moment": ((*dims, "axis"), moment - np.cross(middle, force)),
     }, {"rubbing": list(model.scene.joints_with_friction())}
 
 
-def _mine(row: np.ndarray) -> slice:
+def _bearings_of(row: np.ndarray) -> slice:
     return slice(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"]))
 
 
-def _summed(joints: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _sum_bearings(joints: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return sums over the bearings of each joint, (time, bearing, ...) to (time, joint, ...)."""
-    return np.stack([values[:, _mine(row)].sum(axis=1) for row in joints], axis=1)
+    return np.stack([values[:, _bearings_of(row)].sum(axis=1) for row in joints], axis=1)
 
 
 def warnings(run: Run) -> list[str]:

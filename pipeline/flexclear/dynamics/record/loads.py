@@ -11,12 +11,12 @@ from flexclear.dynamics.model.model import Model
 
 def load_series(model: Model, seen: Observed) -> Variables:
     """Return forces and moments on the (second) frame, lengths and powers, with loads in the order of the scene."""
-    values = acting(model, seen, list(model.scene.forces()))
+    values = record_loads(model, seen, list(model.scene.forces()))
     dims = {"force": ("time", "load", "axis"), "moment": ("time", "load", "axis")}
     return {f"load_{name}": (dims.get(name, ("time", "load")), one) for name, one in values.items()}
 
 
-def acting(model: Model, seen: Observed, names: list[str]) -> dict[str, np.ndarray]:
+def record_loads(model: Model, seen: Observed, names: list[str]) -> dict[str, np.ndarray]:
     """Return force, moment, length and power of loads and films, (time, names) or (time, names, 3) each."""
     force, moment = seen.loads["force"], seen.loads["moment"]
     topology = model.arrays.table(m.LOADS)

@@ -195,7 +195,7 @@ def _angular_velocity(theta: np.ndarray, rate: np.ndarray) -> np.ndarray:
 def motion_series(bodies: Bodies, origin: np.ndarray) -> Variables:
     """Return position, orientation, velocities and acceleration of several bodies over time, by variable."""
     series = {
-        ("position", "axis"): shifted(bodies.position, origin),
+        ("position", "axis"): points_in_world(bodies.position, origin),
         ("quaternion", "quat"): without_sign_jumps(bodies.quaternion),
         ("velocity", "axis"): bodies.velocity,
         ("angular_velocity", "axis"): bodies.omega,
@@ -204,7 +204,7 @@ def motion_series(bodies: Bodies, origin: np.ndarray) -> Variables:
     return {name: (("time", "body", dim), values) for (name, dim), values in series.items()}
 
 
-def shifted(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
+def points_in_world(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
     """Return points (time, point, 3), given from the mechanism's origin, in the world."""
     rows, count, _ = points.shape
     # added to whole rows, since three numbers at a time take five times as long

@@ -127,7 +127,7 @@ class Runner:
             raise InputError("[event]", "a run with events has neither sections nor members", "record other reductions")
         from flexclear.dynamics.events import phases  # here, since a point may have phases, which record runs
 
-        run = phases.simulated(scene, self.bundles, alive, affordable(scene))
+        run = phases.run_with_events(scene, self.bundles, alive, affordable(scene))
         time = run["time"].values
         after = np.searchsorted(time, regular_times(scene.time, scene.output) * (1.0 - SAME_TIME))
         values = _values(run, self.recorded, time, np.minimum(after, len(time) - 1))
@@ -139,11 +139,11 @@ class Runner:
             engine, other = engines(scene, self.bundles, silent, self.engine)
             self.engine = self.engine or engine
 
-        def heir(name: str) -> Engine:
+        def next_engine(name: str) -> Engine:
             with self._making:
                 return other(name)
 
-        return engine, heir
+        return engine, next_engine
 
     def _starts(self, engine: Engine) -> list[np.ndarray]:
         start, model = consistent_start(engine), engine.model
@@ -178,7 +178,7 @@ def with_fewest_outputs(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     if in_sections(recorded):
         # only the states at the waypoints of a period are examined
         return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": section_period(scene)})})
-    if any(one.throughout for one in recorded):
+    if any(one.needs_regular_times for one in recorded):
         return scene
     interval = max(scene.output.interval, (scene.time.end - scene.time.start) / LOOKS)
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
@@ -201,11 +201,11 @@ def _values(run: Labelled, recorded: Sequence[Recorded], time: np.ndarray, regul
         if one.quantity.over_time:
             values[one.name] = _reduce_series(one, time, quantities.series(run, one.quantity), regular)
         elif one.reduction == "series":
-            values[one.name] = quantities.so_far(run, one.quantity, regular, time)
+            values[one.name] = quantities.running_extremes(run, one.quantity, regular, time)
         elif one.quantity.kind == "impact_times":
-            values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
+            values[one.name] = np.asarray(of_impacts(quantities.contact_values(run, one.quantity), one.reduction))
         else:
-            values[one.name] = np.asarray(quantities.events(run, one.quantity)[0])
+            values[one.name] = np.asarray(quantities.contact_values(run, one.quantity)[0])
     return values
 
 

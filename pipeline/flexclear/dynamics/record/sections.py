@@ -57,11 +57,11 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
     names = recorded_bodies(engine.model, requested.bodies, "[sections.bodies]")
     start = consistent_start(engine)
-    parts = repeated(engine, start)
+    parts = engines_of_period(engine, start)
     count = requested.transient + requested.periods
     followed = range(requested.transient, min(count, requested.transient + requested.exponent_periods))
     tape, begin = _Tape(names, engine.start + requested.phase), Cursor()
-    stored, name = journal.current(), f"periods-{digest(engine, start)}"
+    stored, name = journal.current_journal(), f"periods-{digest(engine, start)}"
     arrays = stored.find(name) if stored is not None else None
     if arrays is not None:  # stored by an interrupted run
         remember(engine, arrays)
@@ -75,7 +75,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
             orbit = tape.orbit(parts, done)
             break
         if stored is not None:  # packed now: a failure in the next period would leave the tape half changed
-            state = {**memory(engine), **done.after.packed(), **tape.packed()}
+            state = {**memory(engine), **done.after.packed(), **tape.pack()}
             stored.store(name, lambda state=state: state)  # type: ignore[misc]
     growth, lost = np.array(tape.columns["growth"][: len(followed)]), int(sum(tape.columns["lost"]))
     facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": lost}
@@ -91,7 +91,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     )
 
 
-def repeated(engine: Engine, start: np.ndarray) -> list[Engine]:
+def engines_of_period(engine: Engine, start: np.ndarray) -> list[Engine]:
     """Return the engine for each stretch of a period; raise InputError for a scene whose laws do not repeat."""
     scene = engine.model.scene
     for name, load in scene.load.items():
@@ -137,7 +137,10 @@ class _Tape:
         """Return the motion of the recorded bodies at the waypoints of a period, for the variables of the schema."""
         motions = [self._motion(*one, np.array([0])) for one in zip(parts, done.parts, strict=True)]
         return {
-            f"orbit_{name}": (("waypoint", *_inner(name)), np.concatenate([motion[name] for motion in motions]))
+            f"orbit_{name}": (
+                ("waypoint", *_dimensions_at_row(name)),
+                np.concatenate([motion[name] for motion in motions]),
+            )
             for name in motions[0]
             if f"orbit_{name}" in SECTIONS
         }
@@ -167,14 +170,14 @@ class _Tape:
             if begun is not None and np.isnan(durations[begun]):
                 durations[begun], forces[begun] = event["duration"], event["peak_force"]
 
-    def packed(self) -> dict[str, np.ndarray]:
+    def pack(self) -> dict[str, np.ndarray]:
         """Return all recorded values as arrays."""
         return {name: np.array(values) for name, values in self.columns.items()} | {
             "open": np.array(list(self.open.items()), int).reshape(-1, 2)
         }
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Restore the values that `packed` returned, from a mapping with other arrays."""
+        """Restore the values that `pack` returned, from a mapping with other arrays."""
         mine = ("growth", "lost", "motion.", "impact.")
         self.columns |= {name: list(values) for name, values in arrays.items() if name.startswith(mine)}
         self.open = {int(c): int(k) for c, k in arrays["open"]}
@@ -183,7 +186,7 @@ class _Tape:
         """Return all recorded values by the names of the schema SECTIONS."""
         motion = [name.removeprefix("motion.") for name in self.columns if name.startswith("motion.")]
         kept: Variables = {
-            name: (("section", *_inner(name)), np.array(self.columns[f"motion.{name}"])) for name in motion
+            name: (("section", *_dimensions_at_row(name)), np.array(self.columns[f"motion.{name}"])) for name in motion
         }
         if not model.contacts:
             return kept
@@ -195,11 +198,11 @@ class _Tape:
         for name in ("position", "quaternion", "velocity"):
             values = self.columns[f"impact.{name}"]
             made = np.array(values).reshape(len(values), *kept[name][1].shape[1:])
-            kept[f"impact_{name}"] = (("impact", *_inner(name)), made)
+            kept[f"impact_{name}"] = (("impact", *_dimensions_at_row(name)), made)
         return kept
 
 
-def _inner(name: str) -> tuple[str, ...]:
+def _dimensions_at_row(name: str) -> tuple[str, ...]:
     """Return the dimensions of a series of the motion (`motion_series`) without the first one."""
     if name == "contact_offset":
         return ("contact", "axis")

@@ -20,7 +20,7 @@ from flexclear.dynamics.model.loads import describe
 from flexclear.dynamics.model.model import Model
 from flexclear.scene.laws import Constant
 from flexclear.scene.registry import suggestion
-from flexclear.scene.units import LARGEST_NUMBER, coefficient, exponents, quantity, si
+from flexclear.scene.units import LARGEST_NUMBER, coefficient, exponents, quantity, si_unit
 from flexclear.system.errors import InputError
 
 
@@ -89,7 +89,7 @@ class Inputs(MutableMapping[str, float]):
 
     def unit(self, name: str) -> str:
         """Return the SI unit of an input."""
-        return si(exponents(self.known[self.name(name)].dimension))
+        return si_unit(exponents(self.known[self.name(name)].dimension))
 
     def __getitem__(self, name: str) -> float:
         one = self.known[name := self.name(name)]

@@ -88,7 +88,7 @@ def scene_in_place(scene: Scene) -> Scene:
         return scene
     from flexclear.dynamics.starts import STARTS  # here, since runs start with runs
 
-    return STARTS[scene.start.begins].placed(scene)
+    return STARTS[scene.start.begins].with_placing_joints(scene)
 
 
 def with_driven_actuators(
@@ -167,7 +167,7 @@ def integrate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     """Return the complete run of `RunInParts`; raise StoppedError on a request to stop."""
     run = RunInParts(scene, bundles, progress).whole()
     if run.stopped:
-        raise stopping.error(run.stopped)
+        raise stopping.stopping_error(run.stopped)
     return run
 
 

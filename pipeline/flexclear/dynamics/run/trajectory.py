@@ -154,7 +154,7 @@ def in_parts(
     judge, begun = judge or Judge(SLICE, crawls), engine.start if left is None else left.time
     if outputs is None:
         outputs = engine.output_times(engine.model.scene.output.interval)
-    stopping.check()  # many short integrations never pause
+    stopping.check_stop()  # many short integrations never pause
     tape = begin(engine, y, outputs, progress) if left is None else resume(engine, left, outputs, progress)
     for _ in travel_in_parts(engine, tape, begun, engine.end, progress, stop, judge, jumps):
         yield _collect(engine, tape)
@@ -349,7 +349,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, judge: 
             _warn(engine, tape, progress)
             if stop(_so_far(engine, tape)):
                 return True
-            stopping.check()
+            stopping.check_stop()
 
 
 def _warn(engine: Engine, tape: Tape, progress: Progress) -> None:

@@ -93,7 +93,7 @@ class Family:
                 failed = error
                 continue
             numbers = {k: engine.model.arrays.f for k, engine in around.items()}
-            direction = Direction(central(numbers, step), central(starts, step))
+            direction = Direction(central_difference(numbers, step), central_difference(starts, step))
             narrow = (starts[1] - starts[-1]) / (2.0 * step)
             off, size = (float(np.linalg.norm(v / scales)) for v in (narrow - direction.start, direction.start))
             wide = float(np.linalg.norm((starts[2] - starts[-2]) / scales)) > WIDEST
@@ -117,6 +117,6 @@ def _size(scene: Scene, path: str) -> float:
     return max((abs(value) for value, _ in numbers), default=0.0) if len({unit for _, unit in numbers}) == 1 else 0.0
 
 
-def central(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:
+def central_difference(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:
     """Return the derivative from values at -2, -1, 1 and 2 steps, to the fourth power of the step."""
     return np.asarray((values[-2] - 8.0 * values[-1] + 8.0 * values[1] - values[2]) / (12.0 * step))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexclear.artifacts.labelled import Labelled, LabelledArrays, of
+from flexclear.artifacts.labelled import Labelled, LabelledArrays, label_dataset
 from flexclear.system.errors import InputError, SolverError
 
 #: change of a recipe's number between bundles, as a fraction of it
@@ -35,7 +35,7 @@ class Varied:
 
     def bundle(self, base: Labelled, amount: float) -> LabelledArrays:
         """Return the body's bundle with the number changed by `amount` of its units."""
-        arrays = of(base)
+        arrays = label_dataset(base)
         moved = {
             name: replace(arrays[name], values=arrays[name].values + amount * change)
             for name, change in self.changes.items()
@@ -51,7 +51,7 @@ def vary_number(
     Raises InputError where the bundles differ in their variables' shapes, SolverError where they do not change
     smoothly.
     """
-    middle, sides = of(base), {k: of(bundle) for k, bundle in around.items()}
+    middle, sides = label_dataset(base), {k: label_dataset(bundle) for k, bundle in around.items()}
     names = [n for n in middle if middle[n].values.dtype.kind == "f"]
     if any(n not in side or side[n].values.shape != middle[n].values.shape for side in sides.values() for n in names):
         raise InputError(path, f"changes the number of modes or nodes of '{body}'", "give [modes] a count")

@@ -18,12 +18,9 @@ from flexclear.dynamics.record.motion import Motions
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.horizon.tangents import Differentiated
 from flexclear.dynamics.run.run import observe_run
-from flexclear.dynamics.sensitivity.parameters import Family, Parameter, central
+from flexclear.dynamics.sensitivity.parameters import Family, Parameter, central_difference
 from flexclear.scene.quantity import Quantity
 
-#: steps along a direction are powers of ten, from this one [its unit] to that of its start; each changes no quantity by
-#: a larger fraction of its size
-FINEST = 1e-10
 #: name of the contacts' normal forces among the series
 NORMAL_FORCE = "normal force"
 
@@ -56,7 +53,7 @@ def derivatives(
             for j in (-2, -1, 1, 2)
         }
         for name in around[1]:
-            change = central({j: values[name] for j, values in around.items()}, step)
+            change = central_difference({j: values[name] for j, values in around.items()}, step)
             result.setdefault(name, np.zeros((len(run.trajectory.rows), change.shape[1])))[rows] = change
     return result
 
@@ -86,4 +83,6 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter, wi
             # step of a closed contact, as a fraction of its penetration
             allowed = np.where(closed & (change > 0.0), 1e-2 * depth / change, np.inf)
         steps = np.minimum(steps, allowed.min(axis=1))
-    return np.clip(steps, FINEST, widest)
+    # 1e-10: steps along a direction are powers of ten, from this one [its unit] to that of its start; each changes no
+    # quantity by a larger fraction of its size
+    return np.clip(steps, 1e-10, widest)

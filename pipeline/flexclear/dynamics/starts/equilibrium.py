@@ -20,13 +20,13 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
     Raises InputError for a scene that cannot be built, SolverError without an equilibrium close to its poses.
     """
-    bench, rest, _ = bench_in_equilibrium(placed(scene), bundles, progress)
+    bench, rest, _ = bench_in_equilibrium(with_placing_joints(scene), bundles, progress)
     progress(None, f"starts at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
     rest_state = with_poses(scene, bench.engine, state(bench, rest.at.q), bench.time)
     return with_resting_contacts(rest_state, scene.contacts(), stops=True), bench.engine.model.mechanism.choice
 
 
-def placed(scene: Scene) -> Scene:
+def with_placing_joints(scene: Scene) -> Scene:
     """Return the scene with given joint positions held by drives; of its start only position hints remain."""
     assert scene.start is not None
     holds = with_held_drives(scene, given_coordinates(scene), lambda _, value: Constant(type="constant", value=value))

@@ -50,7 +50,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     Pins whose joints share a force in a way that nothing determines begin in the middle, where they cannot be pressed.
     Raises InputError for an ideal scene that cannot be built, SolverError when other pins cannot be pressed.
     """
-    ideal_scene, t = placed(scene), scene.time.start
+    ideal_scene, t = with_placing_joints(scene), scene.time.start
     engine, y = _start_ideal(ideal_scene, bundles, progress)
     y = _deform_statically(engine, y)
     forces = _forces(scene, engine, y)
@@ -59,7 +59,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
         return concentric, choice
     exact = concentric.model_copy(update={"drive": _exact_drives(ideal_scene, replaceable_contacts(scene), engine, y)})
     try:
-        engine, y = _pressed(exact, bundles, progress, forces)
+        engine, y = _start_with_pressed_pins(exact, bundles, progress, forces)
     except (InputError, SolverError):
         if exact == concentric:
             if engine.mobility.redundant_joints.isdisjoint(replaceable_contacts(scene)):
@@ -67,7 +67,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
             why = "the pins begin in the middle of their sockets: rigid bodies leave open how they share their force"
             return concentric, f"{choice}\n{why}".strip()
         choice = f"{choice}\nthe pins are not pressed into their sockets without moving given joint positions".strip()
-        engine, y = _pressed(concentric, bundles, progress, forces)
+        engine, y = _start_with_pressed_pins(concentric, bundles, progress, forces)
     return with_resting_contacts(
         with_poses_and_velocities(concentric, engine, y, t), replaceable_contacts(scene), stops=False
     ), choice
@@ -87,14 +87,14 @@ def _exact_drives(scene: Scene, pins: Container[str], engine: Engine, y: np.ndar
     return with_held_drives(scene, [start for start in given_coordinates(scene) if start.joint not in pins], law)
 
 
-def _pressed(
+def _start_with_pressed_pins(
     scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, forces: Forces
 ) -> tuple[Engine, np.ndarray]:
     engine, y = _start_ideal(scene, bundles, progress)
     return engine, _press_pins(engine, y, forces)
 
 
-def placed(scene: Scene) -> Scene:
+def with_placing_joints(scene: Scene) -> Scene:
     """Return the scene with ideal joints in place of those clearance joints that have an ideal counterpart."""
     joints = scene.joint | {
         name: IdealJoint.model_validate({"type": joint.ideal, "between": joint.between})

@@ -10,7 +10,7 @@ import numpy as np
 from flexclear.artifacts.labelled import Labelled
 from flexclear.dynamics.model.driving import coordinate_of, label
 from flexclear.dynamics.model.stops import ends
-from flexclear.dynamics.starts.snapshot import writable
+from flexclear.dynamics.starts.snapshot import round_for_scene
 from flexclear.numerics.rotations import quaternion_to_matrix
 from flexclear.scene.fields import Pose
 from flexclear.scene.parts import FlexibleBody, Ground, RigidBody
@@ -28,7 +28,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     Raises InputError where the run has other bodies or modes.
     """
     assert scene.start is not None
-    posed, modal = placed(scene), dict[str, ModalStart]()
+    posed, modal = with_placing_joints(scene), dict[str, ModalStart]()
     row, bodies = scene.start.recorded, dict[str, Any](posed.body)
     for name, body in scene.flexible().items():
         rows = np.array([values for mode, values in row.items() if mode.startswith(f"modal.{name}.")]).reshape(-1, 2)
@@ -40,14 +40,14 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
         moment = bundle["first_moment"].values + bundle["modal_first_moment"].values @ q
         if body.stiffening is not None:
             moment = moment + 0.5 * np.einsum("kij,i,j->k", bundle["second_order_first_moment"].values, q, q)
-        bodies[name] = _at(body, row[f"body.{name}"], moment / float(bundle["mass"].values))
-        modal[name] = ModalStart(coordinate=tuple(writable(q)), velocity=tuple(writable(rows[:, 1])))
+        bodies[name] = _body_at(body, row[f"body.{name}"], moment / float(bundle["mass"].values))
+        modal[name] = ModalStart(coordinate=tuple(round_for_scene(q)), velocity=tuple(round_for_scene(rows[:, 1])))
     assert posed.start is not None
     progress(None, f"continues {scene.start.run} at t = {scene.start.time:.9g} s")
     return posed.model_copy(update={"body": bodies, "start": posed.start.model_copy(update={"modal": modal})}), ""
 
 
-def placed(scene: Scene) -> Scene:
+def with_placing_joints(scene: Scene) -> Scene:
     """Return the scene with the recorded poses of rigid bodies, and of flexible ones as if undeformed.
 
     Its start keeps the recorded numbers for internal states, which `model.internal_states` enters.
@@ -62,7 +62,7 @@ def placed(scene: Scene) -> Scene:
             problem = f"the run {scene.start.run} is of other bodies: {has} has '{min(names)}', {lacks} has not"
             raise InputError(PLACE, problem, "continue a run of a scene with the same bodies")
     bodies = {
-        name: _at(body, row[f"body.{name}"], np.array(body.com) if isinstance(body, RigidBody) else np.zeros(3))
+        name: _body_at(body, row[f"body.{name}"], np.array(body.com) if isinstance(body, RigidBody) else np.zeros(3))
         if name in moving
         else body
         for name, body in scene.body.items()
@@ -75,7 +75,7 @@ def placed(scene: Scene) -> Scene:
             if k == f"contact.{name}" or k.startswith(f"contact.{name}.")
         }
         if speeds and name in joints:
-            joints[name] = joints[name].begun(speeds)
+            joints[name] = joints[name].with_approach_speeds(speeds)
         elif speeds:
             ends = stops if name in stops else gears
             ends[name] = ends[name].model_copy(update={"initial_approach_speed": [*speeds.values()][-1]})
@@ -100,11 +100,11 @@ def _centred_gears(scene: Scene) -> dict[str, Any]:
     return gears
 
 
-def _at(body: Any, recorded: tuple[float, ...], centre: np.ndarray) -> Any:
+def _body_at(body: Any, recorded: tuple[float, ...], centre: np.ndarray) -> Any:
     """Return a body with a recorded motion; centre: its centre of mass in its frame."""
     position, quaternion = np.array(recorded[:3]), np.array(recorded[3:7])
     origin = position - quaternion_to_matrix(quaternion) @ centre
-    pose = Pose(position=tuple(writable(origin)), quaternion=tuple(writable(quaternion)))
+    pose = Pose(position=tuple(round_for_scene(origin)), quaternion=tuple(round_for_scene(quaternion)))
     velocities = {"velocity": recorded[7:10], "angular_velocity": recorded[10:13]}
     kept = velocities if isinstance(body, (RigidBody, FlexibleBody)) else {}
     return body.model_copy(update={"pose": pose, **kept})

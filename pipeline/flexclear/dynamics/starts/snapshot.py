@@ -43,7 +43,7 @@ def with_poses(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
         placement, frame = model.links[i].placements[name], frames[i]
         p = frame["origin"] + frame["axes"] @ placement.p + model.mechanism.origin
         quaternion = matrix_to_quaternion(frame["axes"] @ placement.R)
-        pose = Pose(position=tuple(writable(p)), quaternion=tuple(writable(quaternion)))
+        pose = Pose(position=tuple(round_for_scene(p)), quaternion=tuple(round_for_scene(quaternion)))
         bodies[name] = body.model_copy(update={"pose": pose})
     given = scene.start.modal if scene.start is not None else {}
     modal = {
@@ -98,10 +98,10 @@ def with_resting_contacts(scene: Scene, contacts: Iterable[str], *, stops: bool)
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:
     """Return the values of the modes of flexible bodies, by name."""
-    return {str(engine.model.links[i].flexible): writable(values[own]) for i, own in numbers.items()}
+    return {str(engine.model.links[i].flexible): round_for_scene(values[own]) for i, own in numbers.items()}
 
 
-def writable(values: np.ndarray) -> Any:
+def round_for_scene(values: np.ndarray) -> Any:
     """Return computed values as a scene may give them; rounding below the smallest number of scenes becomes zero."""
     return np.where(np.abs(values) < 1.0 / LARGEST_NUMBER, 0.0, values).tolist()
 
@@ -128,7 +128,7 @@ def with_held_drives(
     return drives
 
 
-def released(scene: Scene, forces: Mapping[str, float]) -> Scene:
+def with_forces_for_drives(scene: Scene, forces: Mapping[str, float]) -> Scene:
     """Return the scene with constant forces [N or N m] in place of drives of joints, named ``drive.<name>``."""
     loads: dict[str, Any] = {}
     for name, force in forces.items():

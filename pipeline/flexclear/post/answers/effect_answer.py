@@ -48,16 +48,15 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
         early, whole = (Influence(float(one[kind][k]), float(one[f"{kind}_uncertainty"][k])) for kind in kinds)
         if np.isfinite(whole.difference):
             unit, scale = str(result["unit"].values[k]), float(result["size"][k])
-            text = in_words(whole, scale, unit)
+            text = change_in_words(whole, scale, unit)
             if np.isfinite(until):
-                text = (
-                    f"up to t = {in_unit(until, 's')} it {in_words(early, scale, unit)}; over the whole run it {text}"
-                )
+                first = change_in_words(early, scale, unit)
+                text = f"up to t = {in_unit(until, 's')} it {first}; over the whole run it {text}"
             sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
     return sentences
 
 
-def in_words(change: Influence, scale: float, unit: str) -> str:
+def change_in_words(change: Influence, scale: float, unit: str) -> str:
     """Return a phrase on the change from the ideal mechanism, as HTML. scale: of the quantity."""
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree within <b class='n'>{in_unit(change.most, unit)}</b>"
@@ -99,12 +98,12 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     needs = needs if certain or possible or result.attrs["refused"] else "no effect is needed"
     beyond = " beyond the horizon" if reached.size else ""
     sentences = [f"For {name}, {needs}{f' (undecided{beyond}: {join_names(possible)})' if possible else ''}."]
-    sentences += [_parts(single, reached)] if reached.size else []
+    sentences += [_early_and_whole_sentence(single, reached)] if reached.size else []
     sentences += [] if requested else [PERCENTAGES]
     return " ".join(sentences + last)
 
 
-def _parts(single: xr.Dataset, reached: np.ndarray) -> str:
+def _early_and_whole_sentence(single: xr.Dataset, reached: np.ndarray) -> str:
     """Return a sentence on the answer's two parts: up to the horizons [s] and over the whole run."""
     words = [str(w) for w in single["words"].values]
     changes = [

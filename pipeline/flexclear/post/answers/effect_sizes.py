@@ -17,7 +17,14 @@ from itertools import combinations, product
 import numpy as np
 import xarray as xr
 
-from flexclear.artifacts.effect_size import Influence, change, early_changes, influence, over_run, size
+from flexclear.artifacts.effect_size import (
+    Influence,
+    early_changes,
+    influence,
+    influence_of_removal,
+    over_run,
+    reference_size,
+)
 from flexclear.artifacts.points import Point
 from flexclear.post.overview.curves import format_with_error, in_unit
 from flexclear.scene.quantity import Quantity
@@ -35,8 +42,6 @@ SLIGHT = 0.01
 FEW = 30.0
 #: labels of the chart's bars
 LEGEND = {"dropped": "removed", "added": "added alone", "early": "removed, up to the horizon"}
-#: the error bar goes back over at most this fraction of a bar, since the axis is logarithmic
-WHISKER = 0.9
 #: words for an infinite effect size, and their meaning
 NOT_COMPARABLE = "not comparable"
 #: beginning of a sentence on a variant without values
@@ -63,7 +68,7 @@ class Pair:
 
 def influence_of(pair: Pair, quantity: Quantity) -> Influence:
     """Return the change by the effect; nan where a run was refused."""
-    return change(pair.without, pair.full, quantity, pair.members)
+    return influence_of_removal(pair.without, pair.full, quantity, pair.members)
 
 
 def is_decided(change: Influence, scale: float) -> bool:
@@ -77,7 +82,7 @@ def undecided_quantities(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantit
     """Return the quantities whose verdict beyond the horizon further members may change."""
     if pair.full.refused or pair.without.refused:
         return []
-    return [q for q in chosen if not is_decided(influence_of(pair, q), size(pair.full, q))]
+    return [q for q in chosen if not is_decided(influence_of(pair, q), reference_size(pair.full, q))]
 
 
 def variants(effects: Sequence[Effect]) -> list[Names]:
@@ -122,7 +127,7 @@ def assemble(
         for pair, row in zip(pairs.values(), early, strict=True)
     ]
     full = next(iter(pairs.values())).full
-    scales = [size(full, q) if not full.refused else np.nan for q in chosen]
+    scales = [reference_size(full, q) if not full.refused else np.nan for q in chosen]
     horizon = "time up to which the members of both variants are one motion each; nan: they always are"
     data = {
         "decided": (dims, np.array([[is_decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
@@ -183,11 +188,11 @@ def with_pairs(
         single = [points.get(ground - with_owners(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
         i, j = names.index(one.name), names.index(other.name)
         for k, quantity in enumerate(chosen):
-            found = {"added_pair": change(gained, bare, quantity, members)}
+            found = {"added_pair": influence_of_removal(gained, bare, quantity, members)}
             if i == j:
                 added[i, k] = found["added_pair"].difference, found["added_pair"].uncertainty
                 continue
-            found["dropped_pair"] = change(lost, points[frozenset()], quantity, members)
+            found["dropped_pair"] = influence_of_removal(lost, points[frozenset()], quantity, members)
             if one.within != other.name and other.within != one.name:
                 found["interaction"] = _interaction(gained, single, bare, quantity, members)
             for kind, value in found.items():
@@ -275,7 +280,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
     chosen = [str(quantity) for quantity in dataset["quantity"].values]
     early = "added" not in dataset and "early" in dataset and bool(np.isfinite(dataset["horizon"].values).any())
     kinds = [kind for kind in ("dropped", "added", "early") if kind in dataset and (early or kind != "early")]
-    with style.style():
+    with style.set_style():
         figure, axes = style.panels(len(chosen), min(2, len(chosen)), 10.0, 1.1, 0.9 + 0.3 * len(names), sharey=True)
         for k, panel in enumerate(axes):
             for n, kind in enumerate(kinds):
@@ -285,7 +290,8 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(rows, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
                 drawn = np.isfinite(shown) & (by_chance > 0.0)
-                ends = [np.minimum(by_chance, WHISKER * shown)[drawn], by_chance[drawn]]
+                # 0.9: the error bar goes back over at most this fraction of a bar, since the axis is logarithmic
+                ends = [np.minimum(by_chance, 0.9 * shown)[drawn], by_chance[drawn]]
                 panel.errorbar(
                     shown[drawn], rows[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
                 )

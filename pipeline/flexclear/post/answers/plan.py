@@ -100,13 +100,13 @@ def table(planned: xr.Dataset) -> Table:
     ]
     rows.append(("requested", "", *requested, "", ""))
     decided = json.loads(planned.attrs["planned"])
-    notes = [words(planned)]
+    notes = [plan_in_words(planned)]
     notes += [f"{name} retains {count} of its modes, which suffice." for name, count in decided["modes"].items()]
     if decided["uncoupled"]:
         notes.append(
             f"Not integrated, since the requested quantities do not depend on it: {join_names(decided['uncoupled'])}."
         )
-    notes += _constant(decided)
+    notes += _unplanned_quantities(decided)
     notes.append(
         f"{_integration_sentence(decided)} The plan is based on {planned.attrs['runs']} short runs, "
         f"{planned.attrs['evaluations']:,} evaluations."
@@ -119,7 +119,7 @@ def table(planned: xr.Dataset) -> Table:
     )
 
 
-def _constant(decided: Mapping[str, Any]) -> list[str]:
+def _unplanned_quantities(decided: Mapping[str, Any]) -> list[str]:
     """Return a sentence that lists the watched quantities for which nothing is planned; else nothing."""
     names = decided["constant"]
     if not names:
@@ -137,7 +137,7 @@ def _integration_sentence(decided: Mapping[str, Any]) -> str:
     return f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}."
 
 
-def words(planned: xr.Dataset) -> str:
+def plan_in_words(planned: xr.Dataset) -> str:
     """Return the plan in a sentence or two, for a designer."""
     needed, unseen, gone = _effects_by_decision(planned)
     keeps = f" {planned.attrs['staying']}" if planned.attrs.get("staying") else ""
@@ -196,7 +196,7 @@ def _verdict(planned: xr.Dataset, k: int) -> str:
             f"{format_difference(float(planned['scatter'][k]), 0.0, unit)}"
             + (", and the means differ by less" if result == MET_TO_HORIZON else "")
         )
-    enough = one.enough(planned.attrs["members"])
+    enough = one.deciding_members(planned.attrs["members"])
     if result == UNDECIDED and np.isfinite(enough):
         reasons.append(f"{int(np.ceil(enough))} members would decide")
     return f"{result}: {'; '.join(reasons)}" if reasons else result

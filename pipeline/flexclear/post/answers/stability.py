@@ -57,8 +57,8 @@ def checks(
 
     members: horizon of the scene's ensemble [s], or None.  by_need: True when the program chose the integrator.
     """
-    agreement = [] if study is None else _agreement(study, _finer(run))
-    result = [_energy_check(run), *_loops(run), *agreement, _rejected_steps(run), _stiffness_check(run, by_need)]
+    agreement = [] if study is None else _agreement_checks(study, _remedy_for_steps(run))
+    result = [_energy_check(run), *_loop_checks(run), *agreement, _rejected_steps(run), _stiffness_check(run, by_need)]
     return [*result, *_condition_checks(run), *_predictability_checks(run, members)]
 
 
@@ -79,16 +79,16 @@ def _drift(run: xr.Dataset) -> np.ndarray | None:
 def _energy_check(run: xr.Dataset) -> Check:
     fraction = float(lost_energy(run).max())
     value = f"{fraction:.1e} of the largest energy"
-    return Check("energy balance", value, f"{ENERGY:g}", fraction < ENERGY, _finer(run))
+    return Check("energy balance", value, f"{ENERGY:g}", fraction < ENERGY, _remedy_for_steps(run))
 
 
-def _finer(run: xr.Dataset) -> str:
+def _remedy_for_steps(run: xr.Dataset) -> str:
     """Return what makes the steps of a run more exact, and its key."""
     step = json.loads(run.attrs.get("parameters", "{}")).get("solver", {}).get("step")
     return "a tighter tolerance: [solver] rtol" if step is None else "shorter steps: [solver] step"
 
 
-def _loops(run: xr.Dataset) -> list[Check]:
+def _loop_checks(run: xr.Dataset) -> list[Check]:
     """Check the drift of closed loops; empty without loops."""
     if (drift := _drift(run)) is None:
         return []
@@ -97,7 +97,7 @@ def _loops(run: xr.Dataset) -> list[Check]:
     return [Check("drift of closed loops", value, f"{LOOPS:g}", fraction < LOOPS, "a tighter tolerance")]
 
 
-def _agreement(study: xr.Dataset, remedy: str) -> list[Check]:
+def _agreement_checks(study: xr.Dataset, remedy: str) -> list[Check]:
     """Check agreement with half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
     result = []
     for method, setting, one in methods(study):
@@ -186,7 +186,7 @@ def figure(run: xr.Dataset) -> dict[str, bytes]:
     if "separation" in run:
         times, values = run["separation_time"].values, run["separation"].values
         panels.append(("distance of a perturbed run", "fraction of each motion", times, values, SEPARATED))
-    with style.style():
+    with style.set_style():
         figure, axes = style.grid(1, len(panels), (3.6 * len(panels), 2.9))
         for axis, (title, label, time, values, limit) in zip(axes.ravel(), panels, strict=True):
             shown = np.where(values > 0.0, values, np.nan)

@@ -11,9 +11,9 @@ import xarray as xr
 
 from flexclear.artifacts import quantities
 from flexclear.artifacts.effect_size import Influence
-from flexclear.post.answers.effect_answer import in_words
+from flexclear.post.answers.effect_answer import change_in_words
 from flexclear.post.answers.effect_sizes import staying_contacts_sentence
-from flexclear.post.overview.curves import impacts, in_unit
+from flexclear.post.overview.curves import impacts_text, in_unit
 from flexclear.post.single_run.series import parameters
 from flexclear.scene.loose_joints import SURFACES
 from flexclear.scene.quantity import Quantity
@@ -62,7 +62,7 @@ def _effects(compared: xr.Dataset) -> list[str]:
             text = f"differs by <b class='n'>{in_unit(difference, unit)}</b>; its error is unknown"
             if np.isfinite(error):
                 size = float(first["largest"][j])
-                text = in_words(Influence(difference, error), size, unit)
+                text = change_in_words(Influence(difference, error), size, unit)
             sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
     return sentences
 
@@ -72,10 +72,10 @@ def _impacts(run: xr.Dataset) -> list[str]:
     sentences = []
     for name in (str(c) for c in run["contact"].values) if "contact" in run.coords else ():
         unit = quantities.unit(run, Quantity(name, "peak_force"))
-        count, peak = (quantities.events(run, Quantity(name, kind)) for kind in ("impact_times", "peak_force"))
+        count, peak = (quantities.contact_values(run, Quantity(name, kind)) for kind in ("impact_times", "peak_force"))
         closed = float(np.mean(run["contact_gap"].sel(contact=name).values < 0.0))
         sentences.append(
-            f"<b>{html.escape(name)}</b>: {impacts(len(count), closed)}; the contact "
+            f"<b>{html.escape(name)}</b>: {impacts_text(len(count), closed)}; the contact "
             f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{in_unit(float(peak[0]), unit)}</b>."
         )
     return sentences

@@ -92,7 +92,7 @@ def assemble(points: Sequence[MeasuredRun], runs: Mapping[str, xr.Dataset], chos
         if asis is not None:
             data["distance"][k] = relative_errors(run, asis, chosen, until)
         for name in COSTS:
-            data[name][k] = cost(run, name)
+            data[name][k] = cost_of_run(run, name)
     described = {name: {"units": one.units, "long_name": one.long_name} for name, one in (COSTS | KINDS).items()}
     variables = {
         name: (("run", "quantity")[: values.ndim], values, described[name]) for name, values in data.items()
@@ -112,7 +112,10 @@ def assemble(points: Sequence[MeasuredRun], runs: Mapping[str, xr.Dataset], chos
         error = _with_uncertainty(relative_errors(asis, reference, chosen, until), floor)
         words = "error of the scene's own run, the reference's uncertainty included, as a fraction of the size"
         variables["own_error"] = (("quantity",), error, {"units": "1", "long_name": words})
-        attributes |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
+        attributes |= {
+            "own_seconds": cost_of_run(asis, "cpu_seconds"),
+            "own_evaluations": cost_of_run(asis, "evaluations"),
+        }
     coordinates = {
         "run": [p.key for p in points],
         "integrator": ("run", [p.integrator for p in points]),
@@ -142,7 +145,7 @@ def _reason(refused: xr.Dataset) -> str:
     return of_trial(str(refused.attrs["refused"]).partition(";")[0])
 
 
-def cost(run: xr.Dataset, name: str) -> float:
+def cost_of_run(run: xr.Dataset, name: str) -> float:
     """Return one of COSTS of a point's run."""
     seconds = run["cpu_repeat"].values
     if name == "cpu_seconds":
@@ -156,7 +159,7 @@ def relative_errors(run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Qua
     """Return the largest errors up to a time [s] as fractions of the quantities' sizes; as they are for a size of
     zero."""
     scales = [quantities.scale(reference, q) for q in chosen]
-    errors = [quantities.error(run, reference, q, until) for q in chosen]
+    errors = [quantities.largest_distance(run, reference, q, until) for q in chosen]
     return np.array([error / scale if scale > 0.0 else error for error, scale in zip(errors, scales, strict=True)])
 
 
@@ -178,7 +181,7 @@ def sentences(study: xr.Dataset) -> str:
     return " ".join(filter(None, (_own_method_sentence(study), _digit(study), *skipped_sentence(study))))
 
 
-def _worst(study: xr.Dataset) -> tuple[str, float]:
+def _worst_own_error(study: xr.Dataset) -> tuple[str, float]:
     """Return quantity and size that the largest error refers to, in words, and that error."""
     errors = study["own_error"].values
     k = int(np.argmax(errors))
@@ -186,7 +189,7 @@ def _worst(study: xr.Dataset) -> tuple[str, float]:
 
 
 def _own_method_sentence(study: xr.Dataset) -> str:
-    of, error = _worst(study)
+    of, error = _worst_own_error(study)
     setting = (
         f"rtol {study.attrs['own_rtol']:g}" if "own_rtol" in study.attrs else f"steps of {study.attrs['own_step']:g} s"
     )
@@ -206,7 +209,7 @@ def _own_method_sentence(study: xr.Dataset) -> str:
 
 def _digit(study: xr.Dataset) -> str:
     """Return a sentence on the cost of one more digit."""
-    _, error = _worst(study)
+    _, error = _worst_own_error(study)
     better = cheapest(study, 0.1 * error) if np.isfinite(error) else None
     if better is None:
         return "One more digit was not reached within the budget." if np.isfinite(error) else ""
@@ -229,7 +232,7 @@ def price_list(study: xr.Dataset, title: str) -> Table:
         choice = cheapest(study, target)
         if choice is None:
             best = min(choices(study), key=lambda c: c.error, default=NOTHING)
-            rows.append((f"{target:g}", _absent(study), "–", "–", f"{best.error:.1e} at best", best.worst))
+            rows.append((f"{target:g}", _unreached_text(study), "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
             seconds = f"{choice.seconds:.3f}"
             rows.append(
@@ -238,7 +241,7 @@ def price_list(study: xr.Dataset, title: str) -> Table:
     return Table(title, COLUMNS, tuple(rows), tuple(_notes(study)))
 
 
-def _absent(study: xr.Dataset) -> str:
+def _unreached_text(study: xr.Dataset) -> str:
     """Return the words for an accuracy that no run of a study has."""
     return "cannot be reached" if study.attrs.get("complete", 1) else "not reached yet"
 

@@ -14,14 +14,23 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flexclear.post.cost.study import MARGIN, is_resolved, methods
-from flexclear.post.plotting.style import GRID, INK, SOFT, files, heading, panels, scale_of, set_plain_numbers, style
+from flexclear.post.plotting.style import (
+    GRID,
+    INK,
+    SOFT,
+    files,
+    heading,
+    panels,
+    scale_of,
+    set_plain_numbers,
+    set_style,
+)
 from flexclear.scene.integrators import INTEGRATORS
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
 MARKS = ("o", "s", "D", "P", "v", "^", "X", "<", ">")
 #: one colour and mark per integrator, the same in every figure
 LOOKS = {name: (COLOURS[k % len(COLOURS)], MARKS[k % len(MARKS)]) for k, name in enumerate(INTEGRATORS)}
-COLUMNS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,8 +51,8 @@ def make(name: str, study: xr.Dataset, title: str, others: Sequence[Curve] = ())
     chosen = [str(q) for q in study["quantity"].values]
     drawn = curves(study)
     recorded = float(study["recording_seconds"].median())
-    with style():
-        figure, axes = panels(len(chosen), COLUMNS, 10.5, 1.1, 2.7)
+    with set_style():
+        figure, axes = panels(len(chosen), 3, 10.5, 1.1, 2.7)
         for k, ax in enumerate(axes):
             _panel(ax, chosen[k], k, (drawn, others), MARGIN * float(study["reference_uncertainty"].values[k]))
             if "own_error" in study:

@@ -56,7 +56,7 @@ def assemble(
                 continue
             numbers["largest"][i, j] = quantities.scale(run, quantity)
             if label in tighter:
-                numbers["error"][i, j] = quantities.error(run, tighter[label], quantity)
+                numbers["error"][i, j] = quantities.largest_distance(run, tighter[label], quantity)
             if quantities.has_quantity(reference, quantity):
                 numbers["difference"][i, j] = _difference_of(run, reference, quantity)
                 if quantity.over_time:
@@ -89,7 +89,7 @@ def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -
 
     For vectors a, b over time, max |a - b| >= | max |a| - max |b| |, taken at the time of the larger one.
     """
-    difference = quantities.error(run, reference, quantity)
+    difference = quantities.largest_distance(run, reference, quantity)
     if not quantity.over_time or quantity.of_place:
         return difference
     return max(difference, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
@@ -126,8 +126,8 @@ def _impacts(runs: Mapping[str, xr.Dataset]) -> dict[str, tuple[tuple[str, ...],
     for i, run in enumerate(runs.values()):
         for k, name in enumerate(names):
             if _has_contact(run, name):
-                count[i, k] = len(quantities.events(run, Quantity(name, "impact_times")))
-                peak[i, k] = quantities.events(run, Quantity(name, "peak_force"))[0]
+                count[i, k] = len(quantities.contact_values(run, Quantity(name, "impact_times")))
+                peak[i, k] = quantities.contact_values(run, Quantity(name, "peak_force"))[0]
     last = list(runs.values())[-1]
     units = [quantities.unit(last, Quantity(name, "peak_force")) if _has_contact(last, name) else "N" for name in names]
     return {
@@ -231,7 +231,7 @@ def colors(runs: Mapping[str, xr.Dataset]) -> list[str]:
 def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> dict[str, bytes]:
     """Draw ``name.png`` and ``name.svg``; runs: schema RUN by label, the reference first."""
     drawn = _panels(runs, chosen)
-    with style.style():
+    with style.set_style():
         figure, axes = style.grid(len(drawn), 2, (11.0, 1.0 + 2.3 * len(drawn)), width_ratios=[1.5, 1.0])
         for row, (quantity, lines) in zip(axes, drawn, strict=True):
             _overlay(row[0], runs, lines)
@@ -273,7 +273,7 @@ def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], lines: Sequence[C
         axes.plot(1e3 * curve.time[firm], factor * curve.values[firm], label=label, **look)
         axes.plot(1e3 * curve.time[~firm], factor * curve.values[~firm], alpha=PALE, **look)
         axes.plot(1e3 * curve.peaks[:, 0], factor * curve.peaks[:, 1], ".", ms=2.5, color=color)
-    style.flatten(axes)
+    style.mark_only_zero(axes)
     time = drawn[0].time
     axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)", title=f"{drawn[0].title} ({unit})")
 
@@ -306,7 +306,7 @@ def _distance(
         axes.plot(1e3 * time, factor * values, color=own[k], lw=0.9)
     time = lines[0][1]
     axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)")
-    style.flatten(axes)
+    style.mark_only_zero(axes)
     axes.set_ylim(bottom=0.0)
     axes.set_title(f"from the reference ({written})")
 

@@ -65,16 +65,14 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
 
 
 NONE = np.empty((0, 2))
-#: a contact is short below so many output intervals
-SHORT = 4.0
 
 
 def _rotation_curve(run: xr.Dataset, quantity: Quantity) -> Curve:
-    turned = turned_by(run, quantity.owner)
+    turned = rotation_of_body(run, quantity.owner)
     return Curve(f"{quantity.owner}: {turned.title}", quantity.unit, run["time"].values, turned.angle, NONE)
 
 
-def turned_by(run: xr.Dataset, body: str) -> Turning:
+def rotation_of_body(run: xr.Dataset, body: str) -> Turning:
     """Return the rotation of a body of a run since the start."""
     mine = run.sel(body=body)
     return rotation_since_start(run["time"].values, mine["quaternion"].values, mine["angular_velocity"].values)
@@ -104,7 +102,7 @@ def _component_values(values: np.ndarray, quantity: Quantity, component: int) ->
 def _rounding_range(run: xr.Dataset, quantity: Quantity) -> float:
     """Return the range that rounding causes in a quantity, by the ranges of all bodies and axes; 0 for other kinds."""
     kind = KINDS[quantity.kind]
-    return noise(run, run[kind.variable].values, quantity.unit) if kind.owner in ("body", "frame") else 0.0
+    return rounding_range(run, run[kind.variable].values, quantity.unit) if kind.owner in ("body", "frame") else 0.0
 
 
 def _force(run: xr.Dataset, joint: str) -> Curve | None:
@@ -123,7 +121,8 @@ def _peaks(run: xr.Dataset, contact: str) -> np.ndarray:
     """Return time and largest force of each contact so short that outputs may miss it."""
     mine = run["event_contact"].values == contact
     mine &= np.isfinite(run["event_peak_force"].values) & np.isfinite(run["event_duration"].values)
-    mine &= run["event_duration"].values < SHORT * float(np.median(np.diff(run["time"].values)))
+    # 4.0: a contact is short below so many output intervals
+    mine &= run["event_duration"].values < 4.0 * float(np.median(np.diff(run["time"].values)))
     middle = run["event_time"].values + 0.5 * run["event_duration"].values
     return np.column_stack([middle[mine], run["event_peak_force"].values[mine]])
 
@@ -177,13 +176,13 @@ NOISE = 1e-9
 ROUNDING = {"m": 1e-13, "m/s": 1e-13, "N": 1e-11, "N m": 1e-11}
 
 
-def impacts(count: int, closed: float = 0.0) -> str:
+def impacts_text(count: int, closed: float = 0.0) -> str:
     """Return the number of impacts in words; closed: fraction of the time in contact."""
     text = "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
     return f"{text}; the contact is closed most of the time ({closed:.0%})" if closed >= CLOSED else text
 
 
-def noise(run: xr.Dataset, values: np.ndarray, unit: str) -> float:
+def rounding_range(run: xr.Dataset, values: np.ndarray, unit: str) -> float:
     """Return the largest range due to rounding in a run's values of one kind, shape (time, ...) [SI unit]."""
     largest = float(np.ptp(values, axis=0).max(initial=0.0))
     return max(NOISE * largest, ROUNDING[unit] * quantities.natural_size(run, unit) if unit in ROUNDING else 0.0)

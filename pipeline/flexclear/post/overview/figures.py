@@ -15,10 +15,10 @@ from flexclear.post.overview.curves import (
     NOISE,
     by_unit,
     curves,
-    impacts,
+    impacts_text,
     in_unit,
-    noise,
-    turned_by,
+    rotation_of_body,
+    rounding_range,
     without_noise,
 )
 from flexclear.post.plotting import style
@@ -53,7 +53,7 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
     require_complete(run)
     post = derive(run) if post is None else post
     first = [term.owner for quantity in watched for term in quantity.terms()]
-    with style.style():
+    with style.set_style():
         panels = _motion(run, post, first) | _energy(run) | _watched_figures(run, watched)
         if post.sizes["joint"]:
             panels |= _reactions(run, post, first)
@@ -100,7 +100,7 @@ def _sheet(
         for label, (values, look) in lines.items():
             panel.plot(1e3 * time, values, label=label, **look)
         panel.set(title=title, xlim=(1e3 * time[0], 1e3 * time[-1]))
-        style.flatten(panel)
+        style.mark_only_zero(panel)
     for panel in figure.axes[-columns:]:
         panel.set_xlabel("time (ms)")
     if legend:
@@ -124,7 +124,7 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
             }
             panels.append((f"{names[k]}: {what} ({written})", lines))
     for k in chosen:
-        turned = turned_by(run, names[k])
+        turned = rotation_of_body(run, names[k])
         angle = np.degrees(without_noise(turned.angle, NOISE))
         panels.append((f"{names[k]}: {turned.title} (°)", {"": (angle, {"color": style.INK})}))
     by_body = [panels[k + n * len(chosen)] for k in range(len(chosen)) for n in range(3)]
@@ -142,7 +142,7 @@ def _watched_figures(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, 
 def watched_curves(run: xr.Dataset, watched: Sequence[Quantity], width: float = 8.0) -> bytes | None:
     """Return PNG of quantities over time, one below the other; width [inches]; None where none has a curve."""
     panels = _curves(run, watched)
-    with style.style():
+    with style.set_style():
         return _sheet("", run["time"].values, panels, 1, ("", ""), width=width)[".png"] if panels else None
 
 
@@ -156,7 +156,7 @@ def _curves(run: xr.Dataset, watched: Sequence[Quantity]) -> list[Panel]:
 
 def _without_noise(run: xr.Dataset, values: np.ndarray, unit: str) -> np.ndarray:
     """Return values (time, ...) with those columns constant that are rounding."""
-    most = noise(run, values, unit)
+    most = rounding_range(run, values, unit)
     series = [without_noise(column, most) for column in values.reshape(len(values), -1).T]
     return np.array(series).T.reshape(values.shape)
 
@@ -180,7 +180,7 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
 
 
 def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
-    """Draw orbit, gap and force of each joint with clearance, those in `first` first; call it within `style.style`."""
+    """Draw orbit, gap and force of each joint with clearance, those in `first` first; call it in `style.set_style`."""
     names, joints = [str(name) for name in run["contact"].values], parameters(run).get("joint", {})
     chosen = _drawn_indices(names, first, post["peak_force"].values, CONTACTS)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
@@ -199,7 +199,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         _over_time(row[1], run, factor * gaps, gap)
         row[1].axhline(0.0, color=style.SOFT, lw=0.8)
         fraction = float(post["contact_time_share"].values[k])
-        count = impacts(int(post["impact_count"].values[k]), fraction)
+        count = impacts_text(int(post["impact_count"].values[k]), fraction)
         peak = float(post["peak_force"].values[k])
         pushes = "normal force" if unit == "N" else "torque"
         _over_time(row[2], run, run["contact_normal_force"].values[:, k])
@@ -220,7 +220,7 @@ def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str = "")
     time = 1e3 * run["time"].values
     axes.plot(time, values, color="#D55E00", lw=0.8)
     axes.set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=title)
-    style.flatten(axes)
+    style.mark_only_zero(axes)
 
 
 def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,15 +13,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from flexclear.post.plotting.style import INK, SOFT, files, heading, panels, set_plain_numbers, style
+from flexclear.post.plotting.style import INK, SOFT, files, heading, panels, set_plain_numbers, set_style
 from flexclear.scene import units
 from flexclear.scene.load import FAMILIES
 from flexclear.scene.quantity import KINDS
 
-COLUMNS = 2
 LINE, REFUSED = "#0072B2", "#D55E00"
-#: largest number of values along the axis of a map that are all written
-FEW = 8
 #: factors for handy numbers on an axis
 HANDY = {"m": (1e3, "mm"), "N": (1.0, "N"), "s": (1e3, "ms")}
 NAME = "sweep"
@@ -38,8 +35,8 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
     shown = _panels(sweep, sections=draw is _curve)
     if draw is None or not shown or not (sweep["status"] == 0).any():
         return {}
-    columns = min(COLUMNS, len(shown))
-    with style():
+    columns = min(2, len(shown))
+    with set_style():
         figure, axes = panels(len(shown), columns, 9.6, 1.0, 2.9 if columns > 1 else 4.2)
         for ax, name in zip(axes, shown, strict=True):
             draw(figure, ax, shown[name], name)
@@ -49,7 +46,7 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
         sentences = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
         sentences += [f"{refused} refused"] if refused else []
         sentences += [f"{missing} not run"] if missing else []
-        sentences += _still(sweep, shown)
+        sentences += _constant_components(sweep, shown)
         if draw is _curve:
             sentences += [text for end, text in BANDS.items() if any(f"{name}{end}" in sweep for name in shown)][:1]
         heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(sentences))
@@ -87,7 +84,7 @@ def _varying_components(vector: xr.DataArray) -> list[str]:
     return axes or list(map(str, vector["axis"].values))
 
 
-def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
+def _constant_components(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
     """Return sentences on components without a panel."""
     constant = []
     for name in map(str, sweep.data_vars):
@@ -103,7 +100,7 @@ def _drawing_function(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
         names = _numeric_parameters(sweep)
         if not names:
             return None
-        ordered = len(names) > 1 and _walks(sweep, names)
+        ordered = len(names) > 1 and _is_path(sweep, names)
         return _curve if len(names) == 1 or ordered else _cloud
     text = [name for name in parameters if sweep[name].dtype.kind not in "fiu"]
     if text:
@@ -117,7 +114,7 @@ def _numeric_parameters(sweep: xr.Dataset) -> list[str]:
     return [name for name in own if sweep[name].dtype.kind in "fiu"]
 
 
-def _walks(sweep: xr.Dataset, names: list[str]) -> bool:
+def _is_path(sweep: xr.Dataset, names: list[str]) -> bool:
     """Return True when all parameters rise, or fall, from point to point: then one determines the others."""
     steps = [np.diff(sweep[name].values) for name in names]
     return all(bool((step > 0).all() or (step < 0).all()) for step in steps)
@@ -166,7 +163,8 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
         if _in_decades(values):
             scale("log")
             set_plain_numbers(axis)
-        if len(values) <= FEW:  # the cells' own values, which may be uneven
+        # 8: largest number of values along the axis of a map that are all written
+        if len(values) <= 8:  # the cells' own values, which may be uneven
             axis.set_ticks(values, labels=[f"{value:.6g}" for value in values])
             axis.set_ticks([], minor=True)
     _color_bar(figure, ax, mesh, _unit_text(sweep[name].attrs["units"]))

@@ -17,7 +17,7 @@ WHAT = {"outer": ("socket or journal", "#D55E00"), "inner": ("ball or pin", "#00
 
 def figure(data: xr.Dataset) -> dict[str, bytes]:
     """Return PNG and SVG of a dataset (schema WEAR), by file name."""
-    with style.style():
+    with style.set_style():
         count = min(data.sizes["worn"], JOINTS)
         drawn, axes = style.grid(count, 3, (11.0, 0.9 + 2.4 * count))
         for k, row in enumerate(axes):

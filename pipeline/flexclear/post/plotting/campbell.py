@@ -35,7 +35,7 @@ def text(data: xr.Dataset) -> str:
 
 def files(name: str, data: xr.Dataset) -> dict[str, bytes]:
     """Draw ``<name>.png`` and ``.svg``: magnitudes of whirls in fixed axes, other vibrations, and the speed itself."""
-    with style.style():
+    with style.set_style():
         figure, axes = style.grid(1, 1, (7.0, 4.6))
         panel, speed = axes[0, 0], data["speed"].values
         frequencies, kinds = np.abs(_in_fixed_axes(data)), data["whirl"].values

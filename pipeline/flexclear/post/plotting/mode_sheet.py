@@ -17,7 +17,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 
-from flexclear.post.body_shape import AROUND, circle, faces, hertz, is_rod, scale_to, surface
+from flexclear.post.body_shape import AROUND, circle, faces, format_frequency, is_rod, scale_to, surface
 from flexclear.post.plotting import style
 from flexclear.post.plotting.style import INK, SOFT
 
@@ -120,24 +120,21 @@ def triad(axes: Axes, camera: View, origin: np.ndarray, length: float, names: tu
 
 #: number of modes in a row, and drawn size of the largest displacement as a fraction of the body's length
 COLUMNS, FRACTION = 3, 0.14
-#: stride of the drawn points around a rod: a sheet shows its modes small
-EVERY = 2
-#: pictures of one vibration in a film
-FRAMES = 16
 
 
 def files(name: str, body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> dict[str, bytes]:
     """Draw ``<name>.png`` and ``<name>.svg`` of all modes of a body (schema BUNDLE), seen from a direction."""
-    with style.style():
+    with style.set_style():
         return style.files(name, _sheet(body, bundle, view(towards, up), 1.0))
 
 
 def film_frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> Iterator[np.ndarray]:
     """Yield pictures of one vibration of all modes, shape (height, width, 3)."""
-    with style.style():
+    with style.set_style():
         camera = view(towards, up)
         drawn: dict[float, np.ndarray] = {}  # both halves of a swing look alike
-        for phase in np.linspace(0.0, 2.0 * np.pi, FRAMES, endpoint=False):
+        # 16: pictures of one vibration in a film
+        for phase in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
             fraction = round(float(np.sin(phase)), 6)
             if fraction not in drawn:
                 drawn[fraction] = _pixels(_sheet(body, bundle, camera, fraction))
@@ -196,7 +193,8 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, camera: View, mode: int, fracti
     index = faces(bundle)
     share_of = np.clip(moved / largest, 0.0, 1.0)
     if is_rod(bundle):
-        rings = points.reshape(-1, AROUND + 1, 3)[:, ::EVERY]
+        # 2: stride of the drawn points around a rod: a sheet shows its modes small
+        rings = points.reshape(-1, AROUND + 1, 3)[:, ::2]
         shell(panel, camera, rings, share_of.reshape(-1, AROUND + 1)[:, 0], zorder=2)
     elif index.shape[1] >= 3:
         skin(panel, camera, points, index, share_of, zorder=2)
@@ -210,5 +208,5 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, camera: View, mode: int, fracti
     edge = 0.03 * float((high - low).max())
     panel.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
     panel.set_axis_off()
-    text = hertz(float(bundle["frequency"].values[mode]))
+    text = format_frequency(float(bundle["frequency"].values[mode]))
     panel.set_title(f"mode {mode + 1}: {text}, × {factor:.2g} √kg m", fontsize=8.8)

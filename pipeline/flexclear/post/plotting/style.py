@@ -56,7 +56,7 @@ RC: dict[str, Any] = {
 
 
 @contextmanager
-def style() -> Iterator[None]:
+def set_style() -> Iterator[None]:
     """Set Matplotlib to this project's look, whatever the user's settings are."""
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -106,7 +106,7 @@ def panels(
     return figure, list(axes.flat[:count])
 
 
-def flatten(axes: Axes) -> None:
+def mark_only_zero(axes: Axes) -> None:
     """Mark only 0 on the upright axis where all lines are zero: its range would be made up."""
     if not any(np.any(np.nan_to_num(np.asarray(line.get_ydata(), dtype=float))) for line in axes.lines):
         axes.set(ylim=(-1.0, 1.0), yticks=[0.0])

@@ -127,7 +127,7 @@ def frames(
     bar = ruler.round_length(0.2 * VIEW / scale)
     long = round(bar * scale)
     legend = None if drawn.stress is None else ruler.color_bar(drawn.stress, HEIGHT)
-    with style.style():
+    with style.set_style():
         plots = panel(drawn.run, post, (SIDE, HEIGHT), watched, curves)
         for k, step in enumerate(steps):
             impact = _in_contact(drawn.run, int(steps[k - 1]) if k else 0, int(step))
@@ -221,7 +221,7 @@ def place_camera(scene: pv.Plotter, drawn: mechanism.Mechanism, margin: int = 0)
 
 
 def plotter(size: tuple[int, int]) -> pv.Plotter:
-    """Return an off-screen plotter. Call it only where `post.render.gl.works()`."""
+    """Return an off-screen plotter. Call it only where `post.render.gl.can_draw()`."""
     # without a display VTK warns and then draws off-screen all the same
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     scene = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")

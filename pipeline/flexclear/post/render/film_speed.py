@@ -41,7 +41,7 @@ def frame_times(
     """Return the times of a film's frames, `rate` a second, in which impacts take `slower` times longer."""
     time, seconds = run["time"].values, seconds or SECONDS
     start, span = float(time[0]), float(time[-1] - time[0])
-    strong = strongest(run)
+    strong = strongest_impacts(run)
     run_fraction = np.linspace(0.0, 1.0, 4001)
     weight = np.ones_like(run_fraction)
     factor = SLOWER if slower is None else slower
@@ -56,7 +56,7 @@ def frame_times(
     return FrameTimes(start + span * fraction, length / passed[-1] * np.interp(fraction, run_fraction, weight) / span)
 
 
-def strongest(run: xr.Dataset) -> np.ndarray:
+def strongest_impacts(run: xr.Dataset) -> np.ndarray:
     """Return the begins of the strongest impacts [s], at most SHOWN, ascending; none without contacts."""
     all_impacts = impacts(run)
     if "impact_time" not in all_impacts:
@@ -109,7 +109,7 @@ EQUAL_BYTES = ["-threads", "1", "-map_metadata", "-1", "-fflags", "+bitexact", "
 CODING = ["-crf", "21", "-preset", "veryfast"]
 
 
-def rate(kind: str) -> int:
+def pictures_per_second(kind: str) -> int:
     """Return the pictures a second of a film; half as many in a GIF."""
     return RATE if kind == "mp4" else RATE // 2
 

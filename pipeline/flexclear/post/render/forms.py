@@ -49,8 +49,6 @@ BALLS = ("spherical", *(name for name, kind in SURFACES.items() if kind.ideal ==
 LOADED, BARE = "load", "frame"
 #: two principal moments closer than this fraction are called equal: a cylinder, not a box; tables print four digits
 ROUND = 0.01
-#: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are visible
-THINNEST = 0.03
 #: largest file of a surface [bytes], since larger ones take too long to draw; and largest coordinate of its points [m]
 LARGEST_FILE, FARTHEST = 200_000_000, 1e15
 #: faces of cells, by their corners, seen from outside
@@ -103,7 +101,8 @@ def equivalent_solid(mass: float, inertia: np.ndarray) -> Solid:
 
 
 def _not_too_thin(half: np.ndarray) -> np.ndarray:
-    return np.maximum(half, THINNEST * half.max())
+    # 0.03: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are visible
+    return np.maximum(half, 0.03 * half.max())
 
 
 def _right_handed(axes: np.ndarray) -> np.ndarray:
@@ -121,7 +120,7 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     joined = joined or [seat for seat in used if seat.joint != LOADED]
     points = _distinct([seat.origin for seat in (*joined, *used)], NEAR * WIDTH * size)
     if len(points) < 2:
-        far = _beyond(points, seats, joined, com, solid, size)
+        far = _points_of_other_frames(points, seats, joined, com, solid, size)
         if len(far) < 2:
             return _surface_without_joints(joined, points, com, solid, size)
         points = far
@@ -142,7 +141,7 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     return surfaces.join([surfaces.place(surfaces.sphere(1.2 * width), middle), *bars])
 
 
-def _beyond(
+def _points_of_other_frames(
     points: np.ndarray, seats: Sequence[Seat], joined: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float
 ) -> np.ndarray:
     """Return points that show a body with one joint, or none, by its other frames too; empty where a block, a wheel or
@@ -193,7 +192,7 @@ def _surface_without_joints(
         return surfaces.place(block, point, slide.axes)
     wheel = next((seat for seat in seats if seat.joint in TURNING), None)
     if wheel is not None:
-        return surfaces.place(_wheel(solid, wheel.axes[:, 2], size), point, surfaces.along(wheel.axes[:, 2]))
+        return surfaces.place(_wheel(solid, wheel.axes[:, 2], size), point, surfaces.axes_along(wheel.axes[:, 2]))
     if any(kind in BALLS for kind in kinds):
         return surfaces.EMPTY
     if solid is None:
@@ -218,7 +217,7 @@ def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) 
 
 def wheel_of_gear(seat: Seat, radius: float, size: float, *, inner: bool) -> Surface:
     """Return a gear's wheel in its body's axes [m], as large as its pitch circle; inner: a ring with teeth inwards."""
-    width, axes = WIDTH * size, surfaces.along(seat.axes[:, 2])
+    width, axes = WIDTH * size, surfaces.axes_along(seat.axes[:, 2])
     if not inner:
         return surfaces.place(_disc(radius, width), seat.origin, axes)
     middle = np.array([radius + 0.5 * width, 0.0, 0.0])
@@ -270,7 +269,7 @@ def _is_slender(solid: Solid, axis: np.ndarray) -> bool:
 
 
 def _plate(points: np.ndarray, normal: np.ndarray, width: float, layer: int) -> Surface:
-    axes = surfaces.along(normal)
+    axes = surfaces.axes_along(normal)
     middle = points.mean(axis=0)
     flat = (points - middle) @ axes
     thickness = FLAT * width * (1.0 - 0.12 * (layer % 5))

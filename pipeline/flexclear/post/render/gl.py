@@ -31,7 +31,7 @@ window.Render()
 """
 
 
-def state() -> str:
+def library_state() -> str:
     """Name the GL libraries of this machine; quick, fit for a cache key; a final none: nothing can be drawn."""
     if missing_libraries():
         return f"without {' and '.join(missing_libraries())}: none"
@@ -52,7 +52,7 @@ def remedy() -> str:
 
 
 @cache
-def works() -> bool:
+def can_draw() -> bool:
     """True when a child process could draw off-screen; takes some seconds the first time."""
     if missing_libraries():
         return False

@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.numerics.rotations import matrix_to_quaternion
-from flexclear.post.body_shape import fields_of, hertz, linear_fields
+from flexclear.post.body_shape import fields_of, format_frequency, linear_fields
 from flexclear.post.render.layout import part_pose, pose
-from flexclear.post.render.mechanism import COLORS, Flexible, Mechanism, rest, skin
+from flexclear.post.render.mechanism import COLORS, Flexible, Mechanism, points_at_rest, skin
 from flexclear.post.render.surfaces import Surface
 
 FLOAT, WHOLE, ARRAY, INDICES = 5126, 5125, 34962, 34963
@@ -50,7 +50,7 @@ class _File:
         """Add a node with this surface, and morph targets where fields are given, and return its number."""
         material: dict[str, Any] = {
             "pbrMetallicRoughness": {
-                "baseColorFactor": [*_linear(color), opacity],
+                "baseColorFactor": [*_linear_colour(color), opacity],
                 "metallicFactor": 0.1,
                 "roughnessFactor": 0.6,
             }
@@ -116,7 +116,7 @@ def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> bytes:
     phase = np.linspace(0.0, 2.0 * np.pi, 25)
     times = file.array(phase / (2.0 * np.pi))
     for k, frequency in enumerate(bundle["frequency"].values):
-        file.begin(f"mode {k + 1}: {hertz(float(frequency))}")
+        file.begin(f"mode {k + 1}: {format_frequency(float(frequency))}")
         file.move(node, "weights", times, np.outer(np.sin(phase), np.eye(count)[k]).ravel())
     return file.bytes(name)
 
@@ -146,7 +146,7 @@ def _add_flexible_body(file: _File, body: Flexible, name: str, q: np.ndarray) ->
     # targets as large as the run's displacements, weights within one: viewers expect that
     largest = np.maximum(np.abs(q).max(axis=0), 1e-30)
     fields = body.scale * largest[:, None, None] * linear_fields(body.bundle)
-    node = file.node(name, skin(body.bundle, rest(body.bundle)), body.color or COLORS[0], 1.0, fields)
+    node = file.node(name, skin(body.bundle, points_at_rest(body.bundle)), body.color or COLORS[0], 1.0, fields)
     return node, q / largest
 
 
@@ -164,6 +164,6 @@ def _follow(file: _File, node: int, times: int, matrices: np.ndarray) -> None:
     file.move(node, "rotation", times, quaternions[:, [1, 2, 3, 0]])
 
 
-def _linear(color: str) -> list[float]:
+def _linear_colour(color: str) -> list[float]:
     """Return a colour of the screen as the linear one of glTF."""
     return [(int(color[k : k + 2], 16) / 255.0) ** 2.2 for k in (1, 3, 5)]

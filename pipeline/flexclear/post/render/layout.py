@@ -143,7 +143,7 @@ def part_pose(run: xr.Dataset, part: Part, step: int) -> np.ndarray:
     matrix, (start, end) = np.eye(4), (site.position(run, step) for site in part.ends)
     long = float(np.linalg.norm(end - start))
     if long > 0.0:
-        matrix[:3, :3] = surfaces.along(end - start)
+        matrix[:3, :3] = surfaces.axes_along(end - start)
     matrix[:3, 2] *= 1.0 if part.length is None else max(long / part.length, THIN)
     matrix[:3, 3] = start
     return matrix
@@ -199,7 +199,7 @@ def _bushing(at: Layout, load: Mapping[str, Any], size: float) -> Iterator[Part]
     first, second = load["between"]
     along = np.diagonal(load["stiffness"])
     axis = min((2, 0, 1), key=lambda k: abs(along[(k + 1) % 3] - along[(k + 2) % 3]))
-    turn, pin = surfaces.along(np.eye(3)[axis]), PIN * size
+    turn, pin = surfaces.axes_along(np.eye(3)[axis]), PIN * size
     ring = forms.ring(1.05 * pin, 2.8 * pin, 3.0 * pin)
     yield at.part_at_frame(first, surfaces.place(ring, np.zeros(3), turn), LOAD_COLOR)
     yield at.part_at_frame(second, surfaces.place(surfaces.cylinder(pin, 4.2 * pin), np.zeros(3), turn), JOINT_COLOR)

@@ -42,8 +42,6 @@ COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9a
 BALL, RAIL = 0.022, 0.008
 #: radius of a drawn socket over that of its ball or pin: the clearance is drawn as if it were the difference
 SOCKET = 1.3
-#: size of a mechanism without extent: one body that rests [m]
-LONE = 1.0
 _CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
 #: largest drawn deformation as a fraction of the body's length
 DEFORMATION_SHARE = 0.05
@@ -104,7 +102,7 @@ def mechanism(
     """
     looks = looks or Looks()
     at = Layout(run, shown_parts(parameters(run), looks), bundles)
-    if stressed and not body_shape.stress_recorded(run):
+    if stressed and not body_shape.bodies_with_stress(run):
         problem = "the run records no von Mises stress"
         raise InputError(
             "--what stress", problem, 'request it: [output] stress = ["BODY"], a rod of known section or a solid'
@@ -116,7 +114,8 @@ def mechanism(
     )
     positions = run.frame_position.values if at.frames else run.position.values
     shown = np.concatenate([positions.reshape(-1, 3), *(drawn_points(run, body, 0)[0] for body in flexible)])
-    size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
+    # 1.0: size of a mechanism without extent: one body that rests [m]
+    size = float(np.linalg.norm(np.ptp(shown, axis=0))) or 1.0
     bodies = tuple(_bodies(at, looks, size))
     parts = (*bodies, *_joints(at, size), *loads(at, size, bodies))
     chosen_view = view(run, at.given, looks.direction, looks.up)
@@ -171,14 +170,14 @@ def shaded_points(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarra
 
 
 def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surface:
-    """Return the surface of a flexible body through points as of `drawn_points` or `rest`; empty for bare nodes.
+    """Return the surface of a flexible body at points as of `drawn_points` or `points_at_rest`; empty for bare nodes.
 
     Unless `sharp`, points keep their number, so that fields fit; edges of solids are then shaded softly.
     """
     return surfaces.with_normals(points, surfaces.triangulate(faces(bundle)), sharp=sharp)
 
 
-def rest(bundle: xr.Dataset) -> np.ndarray:
+def points_at_rest(bundle: xr.Dataset) -> np.ndarray:
     """Return points of the skin of an undeformed body, its centre of mass at the origin [m], shape (point, 3)."""
     return surface(bundle, np.zeros(bundle.sizes["mode"]))[0] - centre_at_rest(bundle)
 
@@ -285,7 +284,7 @@ def _joints(at: Layout, size: float) -> Iterator[Part]:
         elif kind == "universal":
             for frame, axis in ((first, np.eye(3)[0]), (second, np.eye(3)[1])):
                 arm = surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size)
-                yield at.part_at_frame(frame, surfaces.place(arm, np.zeros(3), surfaces.along(axis)), color)
+                yield at.part_at_frame(frame, surfaces.place(arm, np.zeros(3), surfaces.axes_along(axis)), color)
         elif kind == "planar":
             yield at.part_at_frame(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
 
@@ -331,7 +330,7 @@ def _flexible_body(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks,
     in_segments = "segment" in parameters(run)["body"][name]  # these fit together only as they are
     scale = 1.0 if in_segments else looks.exaggeration or fitting
     color = looks.bodies.get(name, {}).get("color")
-    shown = stressed and name in body_shape.stress_recorded(run)
+    shown = stressed and name in body_shape.bodies_with_stress(run)
     if stressed:  # grey does not look like a stress
         color = None if shown else GROUND_COLOR
     return Flexible(names(run, "body").index(name), bundle, columns, scale, color, shown)

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from flexclear.artifacts import quantities
-from flexclear.post.overview.curves import Curve, by_unit, turned_by
+from flexclear.post.overview.curves import Curve, by_unit, rotation_of_body
 from flexclear.post.overview.curves import curves as watched_curves
 from flexclear.post.overview.figures import centre, orbit
 from flexclear.post.plotting import style
@@ -23,8 +23,6 @@ from flexclear.post.single_run.series import derive, parameters
 from flexclear.scene.loose_joints import SURFACES
 from flexclear.scene.quantity import Quantity
 
-#: largest angle of a body that does not turn [degrees]
-STILL = 1e-3
 #: margin next to titles [pixels]
 MARGIN = 6.0
 #: size of a picture of a joint [pixels], and length of its trail as a fraction of the run
@@ -79,7 +77,7 @@ def panel(
     watch: names of bodies, joints and contacts, of which the first of each is shown; else the body that moves farthest,
     the first contact, the first joint.  curves: quantities; the first two that the run has replace motion and reaction.
     """
-    loose = [str(run["contact"].values[k]) for k in with_clearance(run)]
+    loose = [str(run["contact"].values[k]) for k in contacts_with_clearance(run)]
     contact = bool(loose)
     canvas = style.canvas(size, layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.1))
     figure = canvas.figure
@@ -98,7 +96,7 @@ def panel(
     titles = [panel.set_title(panel.get_title(loc="left"), loc="left", fontsize=8.2) for panel in axes]
     clock = _clock(canvas, 13, 0.972, style.INK)
     for panel, title in zip(axes, titles, strict=True):
-        _fit(title, panel, canvas)
+        _fit_title(title, panel, canvas)
     canvas.draw()
     return Panel(canvas, canvas.copy_from_bbox(figure.bbox), tuple(cursors), clock, run.time.values)
 
@@ -107,7 +105,7 @@ def joint_frames(
     run: xr.Dataset, contact: int, seconds: float | None, slower: float | None, rate: int
 ) -> Iterator[np.ndarray]:
     """Yield pictures of a joint with clearance, its ball or pin and its force, shape (540, 960, 3)."""
-    with style.style():
+    with style.set_style():
         canvas = style.canvas(JOINT_SIZE, layout=ConstrainedLayoutEngine(h_pad=0.12, w_pad=0.12))
         left, right = canvas.figure.subplots(1, 2, width_ratios=[1.1, 1.0])
         name, time = str(run["contact"].values[contact]), run["time"].values
@@ -134,7 +132,7 @@ def _clock(canvas: FigureCanvasAgg, fontsize: float, height: float, color: str) 
     return clock
 
 
-def _fit(title: Any, axes: style.Axes, canvas: FigureCanvasAgg) -> None:
+def _fit_title(title: Any, axes: style.Axes, canvas: FigureCanvasAgg) -> None:
     """Shift a title that would be cut off at the right to the left; shrink one that is wider than the figure."""
     width, most = title.get_window_extent(canvas.get_renderer()).width, canvas.figure.bbox.width - 2.0 * MARGIN
     if width > most:
@@ -160,9 +158,10 @@ def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
 
 def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> Cursor:
     """Draw the rotation of the body, or, without rotation, its displacement along the axis of its largest motion."""
-    turned, moved = turned_by(run, str(run.body.values[body])), post.displacement.values[:, body]
+    turned, moved = rotation_of_body(run, str(run.body.values[body])), post.displacement.values[:, body]
     angle = np.degrees(turned.angle)
-    if np.abs(angle).max() > STILL:
+    # 1e-3: largest angle of a body that does not turn [degrees]
+    if np.abs(angle).max() > 1e-3:
         axes.set_title(f"{run.body.values[body]}: {turned.title} (°)")
         return _curve(axes, run, angle, "#0072B2")
     axis = int(np.argmax(np.ptp(moved, axis=0)))
@@ -200,7 +199,7 @@ def _curve(axes: style.Axes, run: xr.Dataset, values: np.ndarray, color: str, wi
     axes.plot(time, values, color=color, lw=width)
     axes.set(xlabel="time (ms)", xlim=(time[0], time[-1]))
     axes.locator_params(axis="x", nbins=5)  # else they change with the width that the layout leaves
-    style.flatten(axes)
+    style.mark_only_zero(axes)
     return Cursor(_dot(axes, 6), time, values)
 
 
@@ -228,7 +227,7 @@ class JointView:
     view: View
 
 
-def with_clearance(run: xr.Dataset) -> list[int]:
+def contacts_with_clearance(run: xr.Dataset) -> list[int]:
     """Return columns of the contacts that are joints with clearance; ends of stops have no path."""
     joints = parameters(run).get("joint", {})
     return [k for k, name in enumerate(run["contact"].values) if str(name) in joints] if "contact" in run.sizes else []
@@ -237,14 +236,14 @@ def with_clearance(run: xr.Dataset) -> list[int]:
 def drawn_joint(run: xr.Dataset, contact: int) -> JointView:
     """Return the drawn surfaces of one joint with clearance."""
     offset = run["contact_offset"].values[:, contact]
-    room, half = _room(parameters(run)["joint"][str(run["contact"].values[contact])], offset)
+    room, half = _free_region(parameters(run)["joint"][str(run["contact"].values[contact])], offset)
     some = np.unique(np.linspace(0, len(offset) - 1, PLACES).astype(int))
     flat = np.ptp(room.points[:, 2]) < 0.1 * half
     view = View(ABOVE if flat else SLANTED, np.eye(3)[1 if flat else 2], False)
     return JointView(room, surfaces.tube(offset[some], PATH * half), surfaces.sphere(MARK * half), view)
 
 
-def _room(given: dict, offset: np.ndarray) -> tuple[Surface, float]:
+def _free_region(given: dict, offset: np.ndarray) -> tuple[Surface, float]:
     """Return the region of the centre without contact, and a length for the size of marks [m].
 
     A sphere or disc of the clearance, a slot longer by its travel; for a ball on a plane the plane of the centre at

@@ -90,7 +90,7 @@ def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes
     _must_draw()
     from flexclear.post.render import film
 
-    drawn, rate = shown.mechanism(stressed=stressed), film_speed.rate(kind)
+    drawn, rate = shown.mechanism(stressed=stressed), film_speed.pictures_per_second(kind)
     frames = film.frames(drawn, derive(drawn.run), rate, shown.watched, shown.curves, shown.progress)
     suffix, content = film_speed.write(frames, rate, kind)
     return {f"{'stress' if stressed else 'film'}.{suffix}": content}
@@ -98,7 +98,7 @@ def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes
 
 def _must_draw() -> None:
     """Raise SolverError without GL libraries, before pyvista is imported: the import would end the process."""
-    if not gl.works():
+    if not gl.can_draw():
         raise SolverError(f"no pictures of solids: {gl.remedy()}")
 
 
@@ -173,7 +173,7 @@ def _mode_series(shown: Shown, kind: str) -> dict[str, bytes]:
 
 def _joints(shown: Shown) -> dict[int, str]:
     """Return joints with clearance by their columns among the contacts."""
-    joints = panel.with_clearance(shown.of_run)
+    joints = panel.contacts_with_clearance(shown.of_run)
     if not joints:
         raise InputError("--what joint", "the scene has no joint with clearance", "show its motion")
     return {k: str(shown.of_run["contact"].values[k]) for k in joints}
@@ -181,7 +181,7 @@ def _joints(shown: Shown) -> dict[int, str]:
 
 def _joint_figures(shown: Shown, kind: str) -> dict[str, bytes]:
     _joints(shown)
-    with style.style():
+    with style.set_style():
         return figures.contacts(shown.of_run, derive(shown.of_run), shown.watched)
 
 
@@ -197,7 +197,7 @@ def _joint_page(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    files, rate = {}, film_speed.rate(kind)
+    files, rate = {}, film_speed.pictures_per_second(kind)
     for k, name in _joints(shown).items():
         pictures = panel.joint_frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
         suffix, content = film_speed.write(pictures, rate, kind)
@@ -227,7 +227,7 @@ def _vibration_sheet(shown: Shown, kind: str) -> dict[str, bytes]:
 
 def _draw_vibrations(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
-    rate = film_speed.rate(kind)
+    rate = film_speed.pictures_per_second(kind)
     suffix, content = film_speed.write(
         vibrations.frames(*_vibrating_mechanism(shown), rate, shown.progress), rate, kind
     )

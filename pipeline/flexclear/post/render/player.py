@@ -14,7 +14,7 @@ import xarray as xr
 
 from flexclear.numerics.rotations import matrix_to_quaternion
 from flexclear.post import body_shape
-from flexclear.post.body_shape import box, faces, fields_of, hertz, linear_fields, scale_to
+from flexclear.post.body_shape import box, faces, fields_of, format_frequency, linear_fields, scale_to
 from flexclear.post.overview.curves import in_unit, readable_unit
 from flexclear.post.render import film_speed, layout, mechanism, panel, surfaces
 from flexclear.post.render.vibrations import Vibrations
@@ -94,7 +94,7 @@ def modes(bundle: xr.Dataset) -> dict[str, Any]:
     """Return all modes of a reduced body for the viewer."""
     points, fields = fields_of(bundle)
     largest = np.linalg.norm(fields, axis=2).max(axis=1)
-    names = [f"mode {k + 1}: {hertz(f)}" for k, f in enumerate(bundle["frequency"].values)]
+    names = [f"mode {k + 1}: {format_frequency(f)}" for k, f in enumerate(bundle["frequency"].values)]
     scale = scales(bundle)
     shapes = [
         {"label": name, "fields": [k, None], "scale": float(scale[k]), "largest": float(largest[k]) or 1.0}
@@ -158,7 +158,7 @@ def _flexible_track(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray
     fields = linear_fields(bundle)
     some = np.unique(np.linspace(0, len(q) - 1, 60).astype(int))
     largest = max(float(np.linalg.norm(np.tensordot(q[k], fields, axes=1), axis=1).max()) for k in some)
-    content = _skin(bundle, mechanism.rest(bundle)) | {
+    content = _skin(bundle, mechanism.points_at_rest(bundle)) | {
         "fields": [_as_16_bits(values) for values in fields],
         "weights": _encode_floats(q[steps]),
         "largest": largest,

@@ -10,8 +10,6 @@ from flexclear.post.render.mechanism import SOCKET, Mechanism
 from flexclear.post.render.view import ANGLE, axes_of, eye
 from flexclear.post.single_run.series import parameters
 
-#: longest bar [pixels]
-LONGEST = 190.0
 #: colours of stress, and the width at either side of a picture for the bar of these colours [pixels]
 STRESS_COLORS, BAR = "turbo", 100
 
@@ -99,7 +97,8 @@ def with_color_bar(pixels: np.ndarray, bar: np.ndarray) -> np.ndarray:
 def ruler(axes: style.Axes, drawn: Mechanism, size: tuple[int, int], margin: int = 0) -> None:
     """Draw a bar of a round length at the lower right; the axes count pixels from the upper left."""
     scale = pixels_per_metre(drawn, size, margin)
-    metres = round_length(LONGEST / scale)
+    # 190.0: longest bar [pixels]
+    metres = round_length(190.0 / scale)
     end, y, half = size[0] - 24.0, size[1] - 30.0, 4.0
     start = end - metres * scale
     axes.plot(

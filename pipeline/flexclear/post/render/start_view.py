@@ -20,7 +20,7 @@ from flexclear.post.render import forms, layout, mechanism, player, surfaces
 from flexclear.post.render.mechanism import Mechanism
 from flexclear.post.render.ruler import exaggeration, project, ruler
 from flexclear.post.render.surfaces import Surface
-from flexclear.post.render.view import flat, gravity
+from flexclear.post.render.view import gravity, planar_view
 from flexclear.post.single_run.series import parameters
 from flexclear.scene.units import quantity
 
@@ -84,13 +84,16 @@ def start_view(
     }
     normal = _normal(text, joints)
     if normal is not None and drawn.looks.direction is None:
-        drawn = replace(drawn, view=flat(normal, text, drawn.looks.up))
+        drawn = replace(drawn, view=planar_view(normal, text, drawn.looks.up))
     # translucent, so that red lines inside are visible
     opacity = 0.4 if gaps else 1.0
     rods = [mechanism.rod_of(name, text["body"][name]) for name in run["body"].values.tolist()]
     solid = [
         *(replace(part, opacity=min(part.opacity, opacity)) for part in drawn.parts),
-        *(_still(body, list(dict.fromkeys(rods)).index(rods[body.index]), opacity) for body in drawn.flexible),
+        *(
+            _undeformed_body(body, list(dict.fromkeys(rods)).index(rods[body.index]), opacity)
+            for body in drawn.flexible
+        ),
     ]
     drawn = replace(drawn, parts=tuple(solid), flexible=())
     extra = [layout.Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
@@ -100,9 +103,9 @@ def start_view(
     return StartView(drawn, tuple(marked), tuple(_notes(drawn, text, gaps)), tuple(gaps), gravity(text))
 
 
-def _still(body: mechanism.Flexible, number: int, opacity: float) -> layout.Part:
+def _undeformed_body(body: mechanism.Flexible, number: int, opacity: float) -> layout.Part:
     """Return a meshed body without deformation; segments of a rod have the same number, which gives the colour."""
-    shown = mechanism.skin(body.bundle, mechanism.rest(body.bundle), sharp=has_edges(body.bundle))
+    shown = mechanism.skin(body.bundle, mechanism.points_at_rest(body.bundle), sharp=has_edges(body.bundle))
     return layout.Part(body.index, shown, body.color or mechanism.COLORS[number % len(mechanism.COLORS)], opacity)
 
 
@@ -268,8 +271,6 @@ def _notes(drawn: mechanism.Mechanism, parameters: Mapping[str, Any], gaps: Sequ
 SIZE, MARGIN = (1600, 1000), 330
 #: heights of lines of names [pixels], with details below and without; begin and end of the columns
 LINES, TOP, BOTTOM = (33.0, 17.0), 70.0, 90.0
-#: pixels between a text and the picture's edge
-EDGE = 12
 
 
 def picture(start: StartView, title: str) -> np.ndarray:
@@ -281,7 +282,7 @@ def picture(start: StartView, title: str) -> np.ndarray:
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.imshow(film.still(start.drawn, 0, SIZE, MARGIN), extent=(0, width, height, 0), aspect="auto")
-    with style.style():
+    with style.set_style():
         points = project(start.drawn, np.array([mark.point for mark in start.marks]).reshape(-1, 3), SIZE, MARGIN)
         shown = _columns(axes, start.marks, points)
         write = partial(_write, axes, SIZE[0] - 2 * 20)
@@ -324,7 +325,8 @@ def _columns(axes: style.Axes, marks: Sequence[Mark], points: np.ndarray) -> int
             align = "left" if right else "right"
             axes.plot([x + (-5 if right else 5), points[k, 0]], [y, points[k, 1]], color=mark.color, lw=0.7, alpha=0.6)
             axes.plot(*points[k], "o", ms=3.5, color=mark.color)
-            write = partial(_write, axes, MARGIN - 12 - EDGE, x, ha=align)
+            # 24: twelve pixels beside the mark, and twelve between a text and the picture's edge
+            write = partial(_write, axes, MARGIN - 24, x, ha=align)
             write(y, mark.text, fontsize=9.5, fontweight="bold", color=mark.color)
             if line == LINES[0]:
                 write(y + 14, mark.detail, fontsize=7.8, color=style.SOFT)

@@ -44,7 +44,7 @@ def place(surface: Surface, origin: np.ndarray, axes: np.ndarray | None = None) 
     return Surface(surface.points @ R.T + origin, surface.normals @ R.T, surface.triangles)
 
 
-def along(direction: np.ndarray) -> np.ndarray:
+def axes_along(direction: np.ndarray) -> np.ndarray:
     """Return right-handed axes, columns, whose z is a direction, shape (3, 3)."""
     z = direction / np.linalg.norm(direction)
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
@@ -131,13 +131,13 @@ def sphere(radius: float) -> Surface:
 def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
     """Return a round bar with flat ends."""
     axis = end - start
-    return place(cylinder(radius, float(np.linalg.norm(axis))), 0.5 * (start + end), along(axis))
+    return place(cylinder(radius, float(np.linalg.norm(axis))), 0.5 * (start + end), axes_along(axis))
 
 
 def cone(base: np.ndarray, tip: np.ndarray, radius: float) -> Surface:
     """Return a round cone, closed below."""
     side = revolve(np.array([[0.0, 0.0], [radius, 0.0], [0.0, np.linalg.norm(tip - base)]]))
-    return place(side, base, along(tip - base))
+    return place(side, base, axes_along(tip - base))
 
 
 def tube(positions: np.ndarray, radius: float, corners: int = 6) -> Surface:
@@ -148,11 +148,11 @@ def tube(positions: np.ndarray, radius: float, corners: int = 6) -> Surface:
         return place(sphere(radius), positions[0])
     tangents = np.gradient(positions, axis=0)
     across = np.empty_like(positions)
-    side = along(tangents[0])[:, 0]
+    side = axes_along(tangents[0])[:, 0]
     for k, tangent in enumerate(_unit(tangents)):  # the side is carried along, so that the tube does not twist
         rest = side - (side @ tangent) * tangent
         size = float(np.linalg.norm(rest))
-        side = rest / size if size > 1e-6 else along(tangent)[:, 0]
+        side = rest / size if size > 1e-6 else axes_along(tangent)[:, 0]
         across[k] = side
     other = np.cross(_unit(tangents), across)
     turn = np.linspace(0.0, 2.0 * np.pi, corners + 1)[None, :, None]

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from flexclear.post.body_shape import hertz, linear_fields
+from flexclear.post.body_shape import format_frequency, linear_fields
 from flexclear.post.render import film_speed, surfaces
 from flexclear.post.render.layout import Part, part_pose, pose
-from flexclear.post.render.mechanism import COLORS, Flexible, Mechanism, rest, skin
+from flexclear.post.render.mechanism import COLORS, Flexible, Mechanism, points_at_rest, skin
 from flexclear.system.progress import Progress, silent
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
@@ -86,7 +86,7 @@ def vibrations(drawn: Mechanism, linear: xr.Dataset) -> Vibrations:
     ]
     largest = np.max(sizes, axis=0)
     labels = tuple(
-        f"vibration {k + 1}: {hertz(frequency)}, damping {damping:.2g}"
+        f"vibration {k + 1}: {format_frequency(frequency)}, damping {damping:.2g}"
         for k, (frequency, damping) in enumerate(
             zip(linear["frequency"].values, linear["damping_ratio"].values, strict=True)
         )
@@ -156,7 +156,7 @@ def _stretch_ends(run: xr.Dataset, linear: xr.Dataset, motions: Motions, part: P
 def _bending_piece(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions) -> Piece:
     matrix = pose(run, body.index, 0)
     fields = linear_fields(body.bundle) @ matrix[:3, :3].T
-    points = rest(body.bundle) @ matrix[:3, :3].T + matrix[:3, 3]
+    points = points_at_rest(body.bundle) @ matrix[:3, :3].T + matrix[:3, 3]
     shape = linear["modal_shape"].values[:, :, body.columns]
     moved = _rigid_displacements(motions, body.index, points, matrix[:3, 3]) + np.tensordot(shape, fields, axes=1)
     return Piece(skin(body.bundle, points), moved, COLORS[0], 1.0, False)

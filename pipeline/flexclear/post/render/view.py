@@ -37,20 +37,22 @@ def view(
     given: the scene's parameters, for gravity, whose opposite is up. asked, upwards: direction to the eye, and upward
     direction, as the user requests them.
     """
-    up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
+    up = _upward_direction(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     if asked is not None:
         direction = np.array(asked, dtype=float)
-        return View(direction / np.linalg.norm(direction) * np.linalg.norm(SPATIAL), _across(up, direction), False)
+        return View(
+            direction / np.linalg.norm(direction) * np.linalg.norm(SPATIAL), _perpendicular(up, direction), False
+        )
     normal = plane(run)
     if normal is None:
         return _spatial(up)
-    return flat(normal, given, upwards)
+    return planar_view(normal, given, upwards)
 
 
-def flat(normal: np.ndarray, given: Mapping[str, Any], upwards: Sequence[float] | None = None) -> View:
+def planar_view(normal: np.ndarray, given: Mapping[str, Any], upwards: Sequence[float] | None = None) -> View:
     """Return the view of a planar mechanism along its normal; the other arguments as of `view`."""
-    up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
-    above = _across(up, normal)
+    up = _upward_direction(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
+    above = _perpendicular(up, normal)
     right = np.cross(above, normal)
     if right[np.argmax(np.abs(right))] < 0.0:  # the axis across the picture runs to the right
         normal, right = -normal, -right
@@ -63,7 +65,7 @@ def eye(camera: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tu
     aspect: width of the picture over its height; the angle of vision is ANGLE upright.
     """
     towards_eye = camera.direction / np.linalg.norm(camera.direction)
-    up = _across(camera.up, towards_eye)
+    up = _perpendicular(camera.up, towards_eye)
     axes = np.array([np.cross(up, towards_eye), up, towards_eye])
     local = cloud @ axes.T
     middle = 0.5 * (local.min(axis=0) + local.max(axis=0))
@@ -119,14 +121,14 @@ def gravity(given: Mapping[str, Any]) -> np.ndarray:
     return np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
 
 
-def _up(given: Mapping[str, Any]) -> np.ndarray:
+def _upward_direction(given: Mapping[str, Any]) -> np.ndarray:
     """Return the direction against gravity; z without gravity."""
     total = gravity(given)
     size = float(np.linalg.norm(total))
     return -total / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
-def _across(up: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def _perpendicular(up: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return `up` made perpendicular to a direction; another axis where they are nearly parallel."""
     unit = direction / np.linalg.norm(direction)
     for candidate in (up, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])):

@@ -37,8 +37,6 @@ from flexclear.scene.output import table
 #: frequencies that the 0-1 test tries; close to 0 and pi it resonates with slow drifts and with motions of period two
 FREQUENCIES, SEED = 100, 20190310
 AWAY = np.pi / 5.0
-#: batches of the exponent's confidence interval: enough for a t distribution, few enough to be nearly independent
-BATCHES = 20
 #: longest period that is searched for, in periods of the drive
 LONGEST = 32
 #: number of lines that hold nearly the whole spectrum of a motion with few frequencies
@@ -65,7 +63,9 @@ def exponent(growth: np.ndarray, period: float) -> Interval:
 
     The interval is that of batch means, since growths of neighbouring periods are correlated.
     """
-    batches = np.array([batch.mean() for batch in np.array_split(growth, min(BATCHES, len(growth)))]) / period
+    # 20: batches of the exponent's confidence interval: enough for a t distribution, few enough to be nearly
+    # independent
+    batches = np.array([batch.mean() for batch in np.array_split(growth, min(20, len(growth)))]) / period
     mean = float(growth.mean() / period)
     if len(batches) < 2:
         return Interval(mean, -np.inf, np.inf)
@@ -212,7 +212,7 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
     lines = np.array([few_lines(component) for component in shown.T])
     largest_K = float(np.nanmax(K)) if np.isfinite(K).any() else float("nan")
     discrete = float(lines.min())
-    kind, reasons = _rule(rate, least, after, distance, largest_K, discrete)
+    kind, reasons = _apply_rules(rate, least, after, distance, largest_K, discrete)
     if len(states) < ENOUGH and kind != "periodic":
         kind, reasons = "undecided", (f"{len(states)} sections are too few, {ENOUGH} are needed", *reasons)
     numbers = {
@@ -229,7 +229,7 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
     return Verdict(kind, reasons, numbers, shown)
 
 
-def _rule(
+def _apply_rules(
     rate: Interval, least: float, after: int, distance: float, K: float, discrete: float
 ) -> tuple[Kind, tuple[str, ...]]:
     text = f"largest exponent {rate.mean:.3g} 1/s, 95 % between {rate.low:.3g} and {rate.high:.3g}"

@@ -89,7 +89,7 @@ POINT = {"s": 9, "lw": 0, "color": COLOR, "alpha": 0.8}
 
 def make(sections: xr.Dataset, verdict: xr.Dataset) -> dict[str, bytes]:
     """Draw sections.png and sections.svg."""
-    with style.style():
+    with style.set_style():
         figure, axes = style.grid(1, 4, (13.2, 3.9))
         section, returns, power, growth = axes[0]
         _draw_section(section, verdict)

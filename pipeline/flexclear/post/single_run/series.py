@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.artifacts.labelled import LabelledArrays, label_arrays, of
-from flexclear.artifacts.quantities import IMPACT, PERTURBATION, SEPARATED, separated_from
+from flexclear.artifacts.labelled import LabelledArrays, label_arrays, label_dataset
+from flexclear.artifacts.quantities import IMPACT, PERTURBATION, SEPARATED, index_of_separation
 from flexclear.artifacts.schema import RUN, Schema, conform_arrays, require_complete
 from flexclear.numerics.rotations import angle_about_y, index_of_largest, rotation_between
 from flexclear.scene.output import table
@@ -28,7 +28,7 @@ Arrays = dict[str, np.ndarray]
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     """Return `derive_arrays` for datasets."""
-    return derive_arrays(of(run), None if ensemble is None else of(ensemble)).to_xarray()
+    return derive_arrays(label_dataset(run), None if ensemble is None else label_dataset(ensemble)).to_xarray()
 
 
 def derive_arrays(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> LabelledArrays:
@@ -50,7 +50,9 @@ def derive_arrays(run: LabelledArrays, ensemble: LabelledArrays | None = None) -
     if ensemble is not None:
         arrays |= ensemble_statistics(ensemble)
         arrays["ensemble_horizon"] = np.array(
-            horizon(ensemble["time"].values, ensemble["velocity"].values, float(ensemble["peak_speed"].values.max()))
+            separation_time(
+                ensemble["time"].values, ensemble["velocity"].values, float(ensemble["peak_speed"].values.max())
+            )
         )
         coords |= {"ensemble_time": ensemble["time"].values, "ensemble_body": ensemble["body"].values}
         coords["quantile"] = np.array(QUANTILES)
@@ -292,7 +294,7 @@ def spread_over_surface(direction: np.ndarray, totals: np.ndarray, sectors: int,
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
-def spread(velocity: np.ndarray) -> np.ndarray:
+def member_spread(velocity: np.ndarray) -> np.ndarray:
     """Return the largest distance of a member's velocity from the mean [m/s], over members and bodies, shape (time,).
 
     velocity: shape (member, time, body, axis) [m/s].
@@ -300,14 +302,14 @@ def spread(velocity: np.ndarray) -> np.ndarray:
     return np.linalg.norm(velocity - velocity.mean(axis=0), axis=-1).max(axis=(0, 2))
 
 
-def horizon(time: np.ndarray, velocity: np.ndarray, speed: float = 0.0) -> float:
-    """Return the time from which members are separated, by `spread` over the largest speed; else the last time [s].
+def separation_time(time: np.ndarray, velocity: np.ndarray, speed: float = 0.0) -> float:
+    """Return the time from which members are separated, by `member_spread` over the top speed; else the last time [s].
 
     speed: the largest one between the given times [m/s].  Beyond the horizon two runs that differ by a perturbation far
     below any tolerance differ visibly, so a pointwise value is one draw out of many.
     """
     peak = max(float(np.linalg.norm(velocity, axis=-1).max()), speed)
-    first = separated_from(time, spread(velocity) / (peak or 1.0), float(time[-1] - time[0]))
+    first = index_of_separation(time, member_spread(velocity) / (peak or 1.0), float(time[-1] - time[0]))
     return float(time[-1] if first is None else time[first])
 
 
@@ -341,7 +343,7 @@ def ensemble_statistics(ensemble: xr.Dataset | LabelledArrays) -> Arrays:
         "impact_count": ensemble["impact_count"].values.astype(float),
         **{name: ensemble[name].values for name in (*same, "peak_acceleration")},
     }
-    result: Arrays = {"spread": spread(ensemble["velocity"].values)}
+    result: Arrays = {"spread": member_spread(ensemble["velocity"].values)}
     for name, values in members.items():
         result[f"{name}_mean"] = values.mean(axis=0)
         result[f"{name}_std"] = values.std(axis=0, ddof=1)

@@ -67,7 +67,7 @@ class Engine:
         waiting, running, seconds_each, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
         evaluations, together = 0.0, False  # evaluations per point in the last batch; whether points are run together
         while waiting or running:
-            stopping.check()
+            stopping.check_stop()
             # only the first point runs until it is finished, so that no kernel is compiled twice
             width = self.width()
             while waiting and len(running) < (QUEUED * width if seconds_each else 1):
@@ -162,13 +162,13 @@ def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
         return pools[-1].submit(work, family, packed, *rest)
 
     def renew() -> None:
-        workers.kill(pools[-1])
+        workers.kill_workers(pools[-1])
         pools.append(workers.pool(width))
 
     try:
         yield Engine(submit, lambda: width, renew=renew)
     except BaseException:
-        workers.kill(pools[-1])
+        workers.kill_workers(pools[-1])
         raise
     pools[-1].shutdown()
 

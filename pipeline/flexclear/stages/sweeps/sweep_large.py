@@ -41,7 +41,7 @@ def is_large(plan: Plan) -> bool:
 
     Raises ResourceError when the dataset cannot be written in slabs either.
     """
-    allowed = plan.scene.limits.memory or machine.ALLOWED_FRACTION * machine.memory()
+    allowed = plan.scene.limits.memory or machine.ALLOWED_FRACTION * machine.available_memory()
     need = TIMES_IN_MEMORY * plan_size(plan)
     if need > allowed and find_spec("zarr") is None:
         machine.require_memory(need, "the sweep's dataset", f"record less, or, to store on disk, {INSTALL}", allowed)

@@ -62,7 +62,7 @@ class Family:
     def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded], here: bool = True) -> None:
         """Store finished points as one artifact. here: whether this machine computed them."""
         name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
-        batch, computed_by = results.batch(points, recorded), instruction_set() if here else None
+        batch, computed_by = results.dataset_of_batch(points, recorded), instruction_set() if here else None
         store.put(self.folder[0], name, {"nc": batch}, self.facts, computed_by)
 
     def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
@@ -290,7 +290,7 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
         given = facts(task, {name: record.digest for name, record in records.items()}, workplace.sources)
         inputs = {name: workplace.store.load(record) for name, record in records.items()}
         keep = tuple(one.name for one in requested.recorded)
-        limited = {**simulate, "limits": graph.scene.limits.written()}  # limits are no facts; a point may raise them
+        limited = {**simulate, "limits": graph.scene.limits.as_table()}  # limits are no facts; a point may raise them
         work = Work(key(given), limited, inputs, keep, requested.sweep.members or 0, requested.sweep.error)
         families[text] = Family(work, given)
     jobs = []

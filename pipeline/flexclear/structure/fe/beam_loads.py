@@ -117,7 +117,7 @@ def _fields(beam: Beam, vectors: np.ndarray) -> np.ndarray:
         return turned
 
     both = at_gauss(sections.fields_at_points(beam, rates))
-    return np.stack([at_gauss(sections.motion(beam))[:, 1], both[:, 0], both[:, 1]])
+    return np.stack([at_gauss(sections.section_motion(beam))[:, 1], both[:, 0], both[:, 1]])
 
 
 def _stiffness_form(mesh: xr.Dataset, beam: Beam, fields: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.artifacts.schema import MESH, conform
 from flexclear.numerics.rotations import quaternion_to_matrix
-from flexclear.scene.segments import SAME_PLACE, cut_names, cuts
+from flexclear.scene.segments import SAME_PLACE, cut_names, nodes_of_cuts
 from flexclear.structure.fe import section
 from flexclear.structure.fe.beam_recipe import FRAME_ROTATION, BeamRecipe, Segment, segments
 from flexclear.structure.fe.section import POINTS
@@ -52,7 +52,7 @@ def cut_segment(mesh: xr.Dataset, segment: Sequence[int]) -> xr.Dataset:
     cut end is one.
     """
     k, count = segment
-    first, last = cuts(mesh["abscissa"].values.tolist(), count)[k - 1 : k + 1]
+    first, last = nodes_of_cuts(mesh["abscissa"].values.tolist(), count)[k - 1 : k + 1]
     ends = {name: {f"cut_{k - 1}": first, f"cut_{k}": last}[name] for name in cut_names(segment)}
     nodes = dict(zip(mesh["frame"].values.tolist(), mesh["frame_node"].values.tolist(), strict=True))
     inside = [name for name in mesh.attrs["interfaces"].split() if first <= nodes[name] <= last]

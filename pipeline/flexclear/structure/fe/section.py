@@ -149,7 +149,7 @@ def rectangle_shear_coefficient(poisson: float) -> float:
     return 10.0 * (1.0 + poisson) / (12.0 + 11.0 * poisson)
 
 
-def _pair(value: Any) -> Any:
+def _two_numbers(value: Any) -> Any:
     """Return two numbers, along y and along z; one number counts for both."""
     return value if isinstance(value, (list, tuple)) else (value, value)
 
@@ -162,7 +162,7 @@ def _fractions(value: tuple[float, float]) -> tuple[float, float]:
 
 ShearCoefficient = Annotated[
     tuple[Number, Number],
-    BeforeValidator(_pair, json_schema_input_type=Number | tuple[Number, Number]),
+    BeforeValidator(_two_numbers, json_schema_input_type=Number | tuple[Number, Number]),
     AfterValidator(_fractions),
 ]
 

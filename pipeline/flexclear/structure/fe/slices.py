@@ -54,13 +54,13 @@ def integrate(body: Slices, vectors: np.ndarray) -> Integrals:
     """Return all invariants for vectors of shape (ndof, n); exact but for rounding."""
     m, X, D = body.mass, body.position.T, body.spread
     s, theta = _motion_of_slices(body, vectors)
-    mode_mode = _mode_mode(m, s)
+    mode_mode = _products_of_modes(m, s)
     position_mode = np.einsum("p,kp,lpj->klj", m, X, s)
     # principal directions of each slice: three weighted motions, instead of nine products of axes
     weights, directions = np.linalg.eigh(D)
     for weight, d in zip(weights.T, directions.transpose(2, 1, 0), strict=True):
         turned = np.cross(theta, d[:, :, None], axis=0)
-        mode_mode += _mode_mode(weight, turned)
+        mode_mode += _products_of_modes(weight, turned)
         position_mode += np.einsum("p,kp,lpj->klj", weight, d, turned)
     return Integrals(
         mass=float(m.sum()),
@@ -107,7 +107,7 @@ def _inertia_without_tilt(body: Slices) -> np.ndarray:
     return inertia
 
 
-def _mode_mode(weight: np.ndarray, s: np.ndarray) -> np.ndarray:
+def _products_of_modes(weight: np.ndarray, s: np.ndarray) -> np.ndarray:
     return np.einsum("kpi,lpj->klij", s * weight[:, None], s, optimize=True)
 
 
@@ -130,28 +130,28 @@ def _rod(mesh: xr.Dataset, beam: Beam) -> Slices:
     x = np.asarray(beam.basis.global_coordinates())[0].ravel()
     start = beam.node_position[0] - R[:, 0] * mesh["abscissa"].values[0]
     J = at_points(mesh, "inertia_moment") * weight[..., None]
-    rigid = spread(J.reshape(-1, 1, 3) * np.eye(3))
+    rigid = second_moments(J.reshape(-1, 1, 3) * np.eye(3))
     rigid[:, 1, 2] = rigid[:, 2, 1] = (per_point(mesh, "inertia_product") * weight).ravel()
     rigid = np.einsum("ik,pkl,jl->pij", R, rigid, R)
     mass, position = (weight * at_points(mesh, "area")).ravel(), start + np.outer(x, R[:, 0])
     centred = np.zeros_like(position)
     if J[..., 1:].any():
-        return Slices(mass, position, rigid, motion(beam), rigid, centred)
+        return Slices(mass, position, rigid, section_motion(beam), rigid, centred)
     area = at_points(mesh, "second_moment")
     scale = (J[..., 0] / (area[..., 1] + area[..., 2])).ravel()
     D = np.zeros_like(rigid)
     D[:, 1, 1], D[:, 2, 2] = scale * area[..., 2].ravel(), scale * area[..., 1].ravel()
     D[:, 1, 2] = D[:, 2, 1] = scale * per_point(mesh, "product_moment").ravel()
-    return Slices(mass, position, np.einsum("ik,pkl,jl->pij", R, D, R), motion(beam, tilts=0.0), rigid, centred)
+    return Slices(mass, position, np.einsum("ik,pkl,jl->pij", R, D, R), section_motion(beam, tilts=0.0), rigid, centred)
 
 
-def spread(inertia: np.ndarray) -> np.ndarray:
+def second_moments(inertia: np.ndarray) -> np.ndarray:
     """Return D of bodies with these inertias about their centres of mass, both of shape (p, 3, 3)."""
     result: np.ndarray = 0.5 * np.trace(inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - inertia
     return result
 
 
-def motion(beam: Beam, tilts: float = 1.0) -> sp.csr_array:
+def section_motion(beam: Beam, tilts: float = 1.0) -> sp.csr_array:
     """Return the motion of the section at all Gauss points; tilts: 0 for sections that only twist about the rod."""
 
     def section(*fields: Any) -> tuple[Any, ...]:
@@ -182,7 +182,7 @@ def fields_at_points(beam: Beam, fields: Callable[..., tuple[Any, ...]]) -> sp.c
 def _lumps(mesh: xr.Dataset, size: int) -> Slices:
     nodes, offset = mesh["lump_node"].values, mesh["lump_offset"].values
     position = mesh["node_position"].values[nodes] + offset
-    D, moved = spread(mesh["lump_inertia"].values), at_centres(selection(node_dofs(nodes), size), offset)
+    D, moved = second_moments(mesh["lump_inertia"].values), at_centres(selection(node_dofs(nodes), size), offset)
     return Slices(mesh["lump_mass"].values, position, D, moved, D, offset)
 
 

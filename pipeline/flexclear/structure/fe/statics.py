@@ -51,7 +51,7 @@ class Flexibility:
         return shapes - self.model.rigid @ np.linalg.solve(self.inertia, self.momentum.T @ shapes)
 
 
-def support(model: Model, progress: Callable[[float], None]) -> Flexibility:
+def factorise_supported(model: Model, progress: Callable[[float], None]) -> Flexibility:
     """Factorise a body on six supports; raise InputError when the body is a mechanism."""
     size = np.linalg.norm(model.rigid, axis=0)
     _, places = scipy.linalg.qr(model.rigid.T / size[:, None], pivoting=True, mode="r")
@@ -110,7 +110,7 @@ class Border:
         return result
 
 
-def border(flexibility: Flexibility, held: sp.csr_array) -> Border:
+def factorise_border(flexibility: Flexibility, held: sp.csr_array) -> Border:
     """Build the small system of held functionals, shape (c, ndof), which must prevent all rigid motion."""
     answer = flexibility.response(held.T.toarray())
     compliance, rigid = held @ answer, np.asarray(held @ flexibility.model.rigid)

@@ -109,6 +109,6 @@ KIND = Kind(
     assemble=assemble,
     words=lambda model, families, vectors: [name.partition("_")[0] for name in families],
     cut=beam_mesh.cut_segment,
-    exact=closed_form.columns,
+    exact=closed_form.exact_frequencies,
     second_order=_second_order,
 )

@@ -11,13 +11,13 @@ import xarray as xr
 from flexclear.structure.fe.model import Interface, Kind, Model, SecondOrder
 from flexclear.structure.fe.solid import mesh as meshes
 from flexclear.structure.fe.solid.model import assemble, forms, inertial_loads, solid_of, unknowns_of
-from flexclear.structure.fe.statics import Flexibility, border, support
+from flexclear.structure.fe.statics import Flexibility, factorise_border, factorise_supported
 
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5
 
 
-def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
+def _mode_words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     """Return bending, torsion or axial for each mode of a rod, by its surface motion; elastic for other bodies."""
     X = model.drawn.position - model.drawn.position.mean(axis=0)
     _, extent, axes = np.linalg.svd(X, full_matrices=False)
@@ -45,7 +45,7 @@ def _second_order(
     mesh: xr.Dataset, model: Model, vectors: np.ndarray, stiffening: bool, held: Interface | None
 ) -> SecondOrder:
     """Return the second-order motion under the stresses of a free spin; with stiffening, under those of all loads."""
-    flexibility, n = support(model, lambda fraction: None), vectors.shape[1]
+    flexibility, n = factorise_supported(model, lambda fraction: None), vectors.shape[1]
     solid, unknowns = solid_of(mesh), unknowns_of(mesh)
     spread, (line, nodal) = unknowns.spread, inertial_loads(solid)
     forms_of = partial(forms, mesh, solid, unknowns, vectors)
@@ -63,7 +63,7 @@ def _second_order(
     if held is None:
         response, nodal = _free_body_response(flexibility, spread, line, nodal, loads)
     else:
-        response = border(flexibility, held.motion).solve(loads)
+        response = factorise_border(flexibility, held.motion).solve(loads)
     found = -forms_of(response, nodal)
     moments, at_frames = found[:12].reshape(4, 3, n, n), found[12:].reshape(-1, 2, 3, n, n)
     return SecondOrder(moments[:3], moments[3], at_frames[:, 0], at_frames[:, 1])
@@ -79,4 +79,4 @@ def _free_body_response(
     return flexibility.response(flexibility.balance_loads(loads)), nodal - inertia
 
 
-KIND = Kind(build=meshes.build, vtu=meshes.as_vtu, assemble=assemble, words=_words, second_order=_second_order)
+KIND = Kind(build=meshes.build, vtu=meshes.as_vtu, assemble=assemble, words=_mode_words, second_order=_second_order)

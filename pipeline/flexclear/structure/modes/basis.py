@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexclear.structure.fe.model import Interface, Model
-from flexclear.structure.fe.statics import Flexibility, border
+from flexclear.structure.fe.statics import Flexibility, factorise_border
 from flexclear.structure.modes import deficits, normal
 from flexclear.structure.modes.normal import WHERE, Normal
 from flexclear.structure.modes.reference import Condition
@@ -51,7 +51,7 @@ class Body:
 
     def normal(self, count: int) -> Normal:
         """Return the lowest normal modes."""
-        return normal.lowest(self.model, self.condition.held, count, self.flexibility, self.progress)
+        return normal.lowest_modes(self.model, self.condition.held, count, self.flexibility, self.progress)
 
 
 def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
@@ -65,15 +65,15 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
     if requested == ModeRequest() and body.condition.loaded.shape[0]:
         # the normal modes of a free body span all that its attachment modes could add
         body = replace(body, condition=replace(body.condition, loaded=body.condition.loaded[:0]))
-    static = _static(body)
-    free = available(body.model, body.condition)
+    static = _static_shapes(body)
+    free = count_normal_modes(body.model, body.condition)
     if body.condition.shapes is not None and requested.count is None and requested != ModeRequest():
         raise InputError(WHERE, "given shapes are taken as they are, all of them", 'write count = "all"')
     if requested.count is not None or requested == ModeRequest():
-        count = request(requested.count, free, static.shape[1])
+        count = count_required_modes(requested.count, free, static.shape[1])
         none = Normal(np.empty(0), np.empty((body.model.size, 0)), np.empty(0))
         modes = body.normal(min(count + MARGIN, free)) if count else none
-        count = whole(modes.values, count, static.shape[1])
+        count = require_whole_clusters(modes.values, count, static.shape[1])
         return _static_and_normal_shapes(body, static, modes, count), modes.rigid_frequency
     tried = FIRST
     while True:
@@ -90,7 +90,7 @@ def build(body: Body, requested: ModeRequest) -> tuple[np.ndarray, np.ndarray]:
         tried *= 2
 
 
-def request(count: int | None, available: int, static: int = 0) -> int:
+def count_required_modes(count: int | None, available: int, static: int = 0) -> int:
     """Return how many of the `available` normal modes a basis of `count` coordinates needs; None selects all.
 
     static: constraint modes that the count includes.  Raises InputError for a count that the mesh cannot give.
@@ -108,23 +108,23 @@ def request(count: int | None, available: int, static: int = 0) -> int:
     return count - static
 
 
-def whole(values: np.ndarray, n: int, static: int = 0) -> int:
+def require_whole_clusters(values: np.ndarray, n: int, static: int = 0) -> int:
     """Return the number n of retained modes; raise InputError when n would cut a cluster of equal frequencies.
 
     values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are retained unless all are.
-    static: see `request`.
+    static: see `count_required_modes`.
     """
     for start, stop in normal.clusters(values):
         if start < n < stop:
             counts = [c + static for c in (start, stop) if c + static > 0]
-            hertz = float(normal.frequency(values[start : start + 1])[0])
+            hertz = float(normal.eigenvalues_to_hz(values[start : start + 1])[0])
             nearest = f"count is {counts[0]}" if len(counts) == 1 else f"counts are {counts[0]} and {counts[1]}"
             problem = f"{n + static} modes split a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz"
             raise InputError(WHERE, problem, f"the nearest whole {nearest}")
     return n
 
 
-def available(model: Model, condition: Condition) -> int:
+def count_normal_modes(model: Model, condition: Condition) -> int:
     """Return the number of normal modes of a mesh under a reference condition."""
     if condition.shapes is not None:
         return 0
@@ -132,14 +132,14 @@ def available(model: Model, condition: Condition) -> int:
     return model.size - (held or 6) - (0 if held else condition.loaded.shape[0])
 
 
-def _static(body: Body) -> np.ndarray:
+def _static_shapes(body: Body) -> np.ndarray:
     """Return constraint modes of the moved functionals, or attachment modes of the loaded ones, shape (ndof, s)."""
     condition = body.condition
     if condition.shapes is not None:
         return condition.shapes
     if len(condition.moved):
         body.progress(None, "static shapes")
-        return border(body.flexibility(), condition.held).shapes(condition.moved)
+        return factorise_border(body.flexibility(), condition.held).shapes(condition.moved)
     if condition.loaded.shape[0]:
         body.progress(None, "static shapes")
         flexibility = body.flexibility()
@@ -161,7 +161,7 @@ def _static_and_normal_shapes(body: Body, static: np.ndarray, modes: Normal, cou
 
 
 def _check_first(modes: Normal, static: np.ndarray, requested: ModeRequest) -> None:
-    first = float(normal.frequency(modes.values[:1])[0])
+    first = float(normal.eigenvalues_to_hz(modes.values[:1])[0])
     if requested.up_to is not None and first > requested.up_to and not static.shape[1]:
         problem = f"no mode lies below {requested.up_to:.6g} Hz; the first is at {first:.6g} Hz"
         raise InputError("modes.up_to", problem, "request a higher frequency")
@@ -170,7 +170,7 @@ def _check_first(modes: Normal, static: np.ndarray, requested: ModeRequest) -> N
 def _has_enough_modes(body: Body, static: np.ndarray, modes: Normal, count: int, requested: ModeRequest) -> bool:
     if requested.up_to is not None:
         following = modes.values[count : count + 1]
-        return bool(following.size == 0 or normal.frequency(following)[0] > requested.up_to)
+        return bool(following.size == 0 or normal.eigenvalues_to_hz(following)[0] > requested.up_to)
     vectors = _static_and_normal_shapes(body, static, modes, count)
     if requested.compliance is not None:
         return deficits.least_fraction(body.flexibility(), body.interfaces, vectors)[0] >= requested.compliance

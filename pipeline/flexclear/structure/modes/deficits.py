@@ -52,7 +52,7 @@ def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -
     model = flexibility.model
     names = [frame.name for frame in model.interfaces]
     progress(None, "compliance of the full model")
-    whole = full(flexibility, model.interfaces)
+    whole = full_compliance(flexibility, model.interfaces)
     fraction = fractions(of_basis(flexibility, model.interfaces, vectors), whole)
     first, resolved = _frequencies(flexibility, vectors, progress)
     progress(None, "error bounds")
@@ -63,13 +63,13 @@ def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -
         "bound_frequency": (("bound_frequency",), at),
         "compliance_full": (("frame", "frame_held", "direction"), whole),
         "compliance_share": (("frame", "frame_held", "direction"), fraction),
-        "error_bound": (("frame", "direction", "bound_frequency"), bounds(flexibility, vectors, at, first)),
+        "error_bound": (("frame", "direction", "bound_frequency"), error_bounds(flexibility, vectors, at, first)),
         "effective_mass": (("direction", "mode"), _effective_mass(model, vectors)),
     }
     return data, {"first_free_frequency": first, "resolved_frequency": resolved}
 
 
-def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, first: float) -> np.ndarray:
+def error_bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, first: float) -> np.ndarray:
     """Return error bounds [m/N, rad/(N m)] for unit loads at every frame, shape (p, 6, frequencies).
 
     hertz: frequencies of the load, below `first`, the free body's first one [Hz].
@@ -77,7 +77,7 @@ def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, fir
     model = flexibility.model
     basis = np.hstack([model.rigid, vectors])
     K, M = model.stiffness @ basis, model.mass @ basis
-    loads = frames(flexibility, model.interfaces)[0].T
+    loads = frame_motions(flexibility, model.interfaces)[0].T
     result = np.empty((loads.shape[1], len(hertz)))
     for k, value in enumerate(hertz):
         square = (2.0 * np.pi * value) ** 2
@@ -105,10 +105,12 @@ def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progre
     model = flexibility.model
     count = min(vectors.shape[1], COMPARED, model.size - 6)
     none = sp.csr_array((0, model.size))
-    full = normal.frequency(normal.lowest(model, none, count, lambda: flexibility, progress, rough=True).values)
+    full = normal.eigenvalues_to_hz(
+        normal.lowest_modes(model, none, count, lambda: flexibility, progress, rough=True).values
+    )
     shapes = flexibility.remove_momentum(vectors)
     values, _ = normal.rediagonalise(model.stiffness, model.mass, shapes)
-    resolved = np.abs(normal.frequency(values)[:count] / full - 1.0) <= RESOLVED
+    resolved = np.abs(normal.eigenvalues_to_hz(values)[:count] / full - 1.0) <= RESOLVED
     whole = count if resolved.all() else int(np.argmin(resolved))
     return float(full[0]), float(full[whole - 1]) if whole else 0.0
 
@@ -123,15 +125,15 @@ def _effective_mass(model: Model, vectors: np.ndarray) -> np.ndarray:
     return (shift.T @ (momentum.T @ vectors)) ** 2
 
 
-def frames(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> tuple[np.ndarray, np.ndarray]:
+def frame_motions(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Return motions of p frames in their own axes: functionals (6 p, ndof), and their rigid motions (p, 6, 6)."""
     motion = np.vstack([in_own_axes(frame).toarray() for frame in interfaces])
     return motion, (motion @ flexibility.model.rigid).reshape(-1, 6, 6)
 
 
-def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndarray:
+def full_compliance(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndarray:
     """Return the compliance [m/N, rad/(N m)] of each frame with each other one held (itself: none), shape (p, p, 6)."""
-    (motion, rigid), p = frames(flexibility, interfaces), len(interfaces)
+    (motion, rigid), p = frame_motions(flexibility, interfaces), len(interfaces)
     loads = np.hstack([motion.T, flexibility.momentum])
     gram = loads.T @ flexibility.response(loads)
     result = np.empty((p, p, 6))
@@ -149,8 +151,8 @@ def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndar
 
 
 def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> np.ndarray:
-    """Return the compliance that shapes (ndof, n) represent, as in `full`; any combination and scale of them."""
-    functionals, rigid = frames(flexibility, interfaces)
+    """Return the compliance that shapes (ndof, n) represent, as `full_compliance`; any combination, any scale."""
+    functionals, rigid = frame_motions(flexibility, interfaces)
     K = vectors.T @ (flexibility.model.stiffness @ vectors)
     relief = np.linalg.solve(flexibility.inertia, flexibility.momentum.T @ vectors)
     scale = 1.0 / np.sqrt(np.diag(K))
@@ -163,7 +165,7 @@ def least_fraction(
     flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray
 ) -> tuple[float, str]:
     """Return the least compliance fraction between interfaces (of a single one: of the free body), and its location."""
-    whole = full(flexibility, interfaces)
+    whole = full_compliance(flexibility, interfaces)
     each = fractions(of_basis(flexibility, interfaces, vectors), whole)
     if len(interfaces) > 1:
         each[np.arange(len(each)), np.arange(len(each))] = 1.0

@@ -17,8 +17,6 @@ from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress
 
 WHERE = "mesh recipe [shape]"
-#: number of frequencies of the free body that are compared
-COMPARED = 10
 #: largest relative difference from a frequency or mass of a listing of the same model
 SAME = 0.01
 #: a listed frequency is one of a rigid motion below this fraction of the first elastic one
@@ -34,13 +32,16 @@ def measure(mesh: xr.Dataset, flexibility: Flexibility, progress: Progress) -> t
         return {}, {}
     model = flexibility.model
     none = sp.csr_array((0, model.size))
-    count = min(COMPARED, model.size - 6)
-    free = normal.frequency(normal.lowest(model, none, count, lambda: flexibility, progress).values)[:count]
+    # 10: number of frequencies of the free body that are compared
+    count = min(10, model.size - 6)
+    free = normal.eigenvalues_to_hz(normal.lowest_modes(model, none, count, lambda: flexibility, progress).values)[
+        :count
+    ]
     data = {"free_frequency": (("free_mode",), free)}
     mass, centre, inertia = rigid_properties(model)
     stated = float(mesh["listed_mass"]) if "listed_mass" in mesh else float(mesh.get("body_mass", np.nan))
     if "listed_frequency" in mesh:
-        listed = _elastic(mesh["listed_frequency"].values, free)[:count]
+        listed = _elastic_frequencies(mesh["listed_frequency"].values, free)[:count]
         data["listed_frequency"] = (("listed",), listed)
         _require_same("frequency 1 of the free body", free[0], listed[0], "Hz")
     if np.isfinite(stated):
@@ -82,7 +83,7 @@ def rigid_properties(model: Model) -> tuple[float, np.ndarray, np.ndarray]:
     return mass, model.position.mean(axis=0) + lever, inertia
 
 
-def _elastic(listed: np.ndarray, free: np.ndarray) -> np.ndarray:
+def _elastic_frequencies(listed: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Return the listed frequencies without those of rigid motions; raise InputError unless some are left."""
     elastic = listed[6:]
     if len(elastic) == 0 or np.any(listed[:6] > RIGID * elastic[0]):

@@ -17,7 +17,7 @@ import scipy.sparse.linalg
 
 from flexclear.numerics.rotations import index_of_largest
 from flexclear.structure.fe.model import Model, own_dofs
-from flexclear.structure.fe.statics import Flexibility, border
+from flexclear.structure.fe.statics import Flexibility, factorise_border
 from flexclear.structure.sparse import negative_pivots
 from flexclear.system.errors import InputError, SolverError
 from flexclear.system.progress import Progress
@@ -37,7 +37,7 @@ class Normal:
     rigid_frequency: np.ndarray
 
 
-def lowest(
+def lowest_modes(
     model: Model,
     held: sp.csr_array,
     count: int,
@@ -70,7 +70,7 @@ def _dense_free(model: Model, count: int) -> Normal:
     # the solver leaves a trace of rigid motion; momentum must vanish to rounding
     momentum = model.mass @ model.rigid
     elastic = elastic - model.rigid @ np.linalg.solve(model.rigid.T @ momentum, momentum.T @ elastic)
-    return Normal(values[n : n + count], elastic, np.sort(frequency(values[:n])))
+    return Normal(values[n : n + count], elastic, np.sort(eigenvalues_to_hz(values[:n])))
 
 
 def _dense_held(model: Model, held: sp.csr_array, count: int) -> Normal:
@@ -90,7 +90,7 @@ def _sparse_modes(
     model: Model, held: sp.csr_array, count: int, flexibility: Flexibility, progress: Progress, *, rough: bool
 ) -> Normal:
     if held.shape[0]:
-        inverse = border(flexibility, held).solve
+        inverse = factorise_border(flexibility, held).solve
     else:
 
         def inverse(loads: np.ndarray) -> np.ndarray:
@@ -107,10 +107,10 @@ def _sparse_modes(
     rigid = NOBODY
     if not held.shape[0]:
         rigid = _rigid_frequency(model, values[0])
-    below = gap(values)
+    below = count_below_gap(values)
     if below is not None and not rough:
         progress(None, "checking that no mode was missed")
-        _nothing_missed(model, held, *below)
+        _require_complete_spectrum(model, held, *below)
     return Normal(values, shapes, rigid)
 
 
@@ -119,10 +119,10 @@ def _rigid_frequency(model: Model, first: float) -> np.ndarray:
     K, M = (model.rigid.T @ (matrix @ model.rigid) for matrix in (model.stiffness, model.mass))
     values = scipy.linalg.eigh(K, M, eigvals_only=True)
     without_rigid(np.append(values, first), len(values))
-    return np.sort(frequency(values))
+    return np.sort(eigenvalues_to_hz(values))
 
 
-def _nothing_missed(model: Model, held: sp.csr_array, count: int, between: float) -> None:
+def _require_complete_spectrum(model: Model, held: sp.csr_array, count: int, between: float) -> None:
     """Raise SolverError unless K - s M, s = `between`, has `count` negative pivots (Sylvester's law of inertia)."""
     shifted = sp.csr_array(model.stiffness - between * model.mass)
     dofs = own_dofs(held)
@@ -141,7 +141,7 @@ def _nothing_missed(model: Model, held: sp.csr_array, count: int, between: float
         positions = np.vstack([positions, np.zeros((extra, 3))])
     below = negative_pivots(shifted, positions, extra) - extra
     if below != count:
-        where = float(frequency(np.array([between]))[0])
+        where = float(eigenvalues_to_hz(np.array([between]))[0])
         raise SolverError(f"modes: {below} frequencies lie below {where:.6g} Hz, the eigensolver found {count}")
 
 
@@ -191,7 +191,7 @@ def lanczos_eigenpairs(
     return values[order], vectors[:, order]
 
 
-def gap(values: np.ndarray) -> tuple[int, float] | None:
+def count_below_gap(values: np.ndarray) -> tuple[int, float] | None:
     """Return how many eigenvalues lie below the last gap between unequal ones, and a value in the gap, or None."""
     last = clusters(values)[-1][0]
     return (last, float(0.5 * (values[last - 1] + values[last]))) if last else None
@@ -222,14 +222,14 @@ def _rayleigh_ritz(stiffness: sp.csr_array, mass: sp.csr_array, basis: np.ndarra
     return values, scaled @ combination
 
 
-def frequency(values: np.ndarray) -> np.ndarray:
+def eigenvalues_to_hz(values: np.ndarray) -> np.ndarray:
     """Convert eigenvalues [rad^2/s^2] to Hz; rigid modes may be negative by rounding, so the absolute value counts."""
     return np.sqrt(np.abs(values)) / (2.0 * np.pi)
 
 
 def clusters(values: np.ndarray) -> list[tuple[int, int]]:
     """Return ranges [start, stop) of equal eigenvalues; a single eigenvalue is a range of length one."""
-    hertz = frequency(values)
+    hertz = eigenvalues_to_hz(values)
     breaks = np.flatnonzero(np.diff(hertz) > EQUAL * hertz[1:]) + 1
     edges = [0, *breaks.tolist(), len(values)]
     return [(a, b) for a, b in pairwise(edges) if b > a]
@@ -241,7 +241,7 @@ def without_rigid(values: np.ndarray, rigid: int) -> None:
     The gap is missing where the mesh contains a mechanism, or where rounding hides it.
     """
     if not values[rigid] > RIGID_GAP * np.abs(values[:rigid]).max():
-        last, first = frequency(values[rigid - 1 : rigid + 1])
+        last, first = eigenvalues_to_hz(values[rigid - 1 : rigid + 1])
         raise SolverError(
             f"modes: {rigid} rigid-body modes are expected below a gap, "
             f"but mode {rigid} is at {last:.3g} Hz and mode {rigid + 1} at {first:.3g} Hz"
@@ -270,7 +270,7 @@ def _rank(model: Model) -> np.ndarray:
     return 0.25 * (1.0 - families.along) + (len(families.names) - 1 - families.member)
 
 
-def family(model: Model, vectors: np.ndarray) -> list[str]:
+def dominant_families(model: Model, vectors: np.ndarray) -> list[str]:
     """Return for each vector the family with the largest fraction of its kinetic energy."""
     families = model.families
     fraction = (families.local @ vectors) * (families.local @ (model.mass @ vectors))

@@ -86,7 +86,7 @@ def in_own_axes(frame: Interface) -> sp.csr_array:
     return sp.csr_array(turned)
 
 
-def distinct(frames: tuple[Interface, ...]) -> None:
+def require_distinct_frames(frames: tuple[Interface, ...]) -> None:
     """Raise InputError when two frames move alike, so that the second one adds nothing."""
     for k, frame in enumerate(frames):
         for other in frames[:k]:
@@ -95,7 +95,7 @@ def distinct(frames: tuple[Interface, ...]) -> None:
                 raise InputError("modes.interfaces", problem, "remove one of them")
 
 
-def check(model: Model, condition: Condition) -> None:
+def require_definite_condition(model: Model, condition: Condition) -> None:
     """Raise InputError unless the held motions are independent and leave no rigid motion (or are none at all)."""
     held = condition.held
     if held.shape[0] == 0:
@@ -131,7 +131,7 @@ def craig_bampton(model: Model, given: Given) -> Condition:
     Raises InputError without interfaces, and when two interfaces are the same.
     Source: Craig & Bampton (1968), AIAA Journal 6, 1313-1319.
     """
-    distinct(interfaces_of(given, 1, "a Craig-Bampton basis needs at least one interface"))
+    require_distinct_frames(interfaces_of(given, 1, "a Craig-Bampton basis needs at least one interface"))
     held = rows(given.interfaces, model.size)
     first = given.interfaces[0].name
     note = f"the body frame moves with '{first}', where all shapes vanish; no rigid motion is left"
@@ -246,7 +246,7 @@ def craig_chang(model: Model, given: Given) -> Condition:
     of their computation and is removed by mass orthogonality.  Raises InputError without interfaces.
     Source: Craig & Chang (1977), NASA CR-2731; Craig & Kurdila (2006), ch. 17.
     """
-    distinct(interfaces_of(given, 1, "attachment modes need an interface to load"))
+    require_distinct_frames(interfaces_of(given, 1, "attachment modes need an interface to load"))
     note = "six rigid-body modes were removed; the attachment modes' rigid motion was removed by mass orthogonality"
     return _free_condition(model, note, rows(given.interfaces, model.size))
 

@@ -12,11 +12,11 @@ import xarray as xr
 from flexclear.artifacts.schema import MODES, conform
 from flexclear.scene.registry import lookup, suggestion
 from flexclear.structure.fe.model import DOFS, Interface, Model
-from flexclear.structure.fe.statics import Flexibility, support
+from flexclear.structure.fe.statics import Flexibility, factorise_supported
 from flexclear.structure.kinds.kind import of_mesh
 from flexclear.structure.modes import basis, deficits, imported, normal
 from flexclear.structure.modes.basis import ModeRequest
-from flexclear.structure.modes.reference import CONDITIONS, Condition, Given, check
+from flexclear.structure.modes.reference import CONDITIONS, Condition, Given, require_definite_condition
 from flexclear.system.errors import InputError
 from flexclear.system.progress import Progress, silent
 
@@ -50,18 +50,18 @@ def solve(
     progress(None, "assembling")
     model = kind.assemble(mesh)
     names = tuple(mesh.attrs["interfaces"].split()) if interfaces is None else tuple(interfaces)
-    given, condition = _held(model, reference, names, held, of)
+    given, condition = _given_and_condition(model, reference, names, held, of)
 
     @cache
     def flexibility() -> Flexibility:
-        return support(model, lambda fraction: progress(fraction, f"factorising {model.size} coordinates"))
+        return factorise_supported(model, lambda fraction: progress(fraction, f"factorising {model.size} coordinates"))
 
     imported.require_definite(mesh, flexibility)
     body = basis.Body(model, condition, given.interfaces, flexibility, progress)
     shapes, rigid_frequency = basis.build(body, requested or ModeRequest(count=count))
     values, vectors = normal.rediagonalise(model.stiffness, model.mass, shapes)
     vectors = normal.orient(model, values, vectors)
-    families = normal.family(model, vectors)
+    families = normal.dominant_families(model, vectors)
     vectors = normal.fix_signs(model, vectors, families)
     data = _variables(model, values, vectors)
     data["kind"] = (("mode",), np.array(kind.words(model, families, vectors)))
@@ -78,7 +78,7 @@ def solve(
     return conform(xr.Dataset(data | lacks), MODES, **attributes)
 
 
-def _held(
+def _given_and_condition(
     model: Model, reference: str, names: Sequence[str], held: Sequence[str], of: str | None
 ) -> tuple[Given, Condition]:
     """Return the scene's data of a reference condition, and the condition; raise InputError as `solve` does."""
@@ -86,7 +86,7 @@ def _held(
     condition: Condition = lookup(CONDITIONS, reference, kind="reference condition", where="modes.reference")(
         model, given
     )
-    check(model, condition)
+    require_definite_condition(model, condition)
     return given, condition
 
 
@@ -95,9 +95,9 @@ def require_possible(model: Model, modes: Modes, names: Sequence[str]) -> None:
 
     names: interfaces of the mesh, for modes without their own.
     """
-    _, condition = _held(model, modes.reference, modes.interfaces or names, modes.held, modes.of)
+    _, condition = _given_and_condition(model, modes.reference, modes.interfaces or names, modes.held, modes.of)
     if isinstance(modes.count, int) and modes.count:
-        basis.request(modes.count, basis.available(model, condition), condition.static)
+        basis.count_required_modes(modes.count, basis.count_normal_modes(model, condition), condition.static)
 
 
 def _frame(model: Model, name: str) -> Interface:
@@ -109,7 +109,7 @@ def _frame(model: Model, name: str) -> Interface:
 
 def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[str, Any]:
     return {
-        "frequency": (("mode",), normal.frequency(values)),
+        "frequency": (("mode",), normal.eigenvalues_to_hz(values)),
         "shape": (("node", "dof", "mode"), model.drawn.nodal_motion(vectors)),
         "vector": (("unknown", "mode"), vectors),
         "node_position": (("node", "axis"), model.drawn.position),

@@ -152,7 +152,7 @@ def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline |
     return OUTLINES[name](sections.SHAPES[name].constants(*lengths), poisson, *lengths)
 
 
-def _round(section: Section, poisson: float, radius: float, inner: float = 0.0) -> Outline:
+def _round_outline(section: Section, poisson: float, radius: float, inner: float = 0.0) -> Outline:
     angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
     ring = np.stack([np.cos(angle), np.sin(angle)])
     y, z = np.concatenate([radius * ring, inner * ring if inner else np.zeros((2, 1))], axis=1)
@@ -184,7 +184,7 @@ def _flexure(
     return scale * along, scale * (across + (2.0 + poisson) * y * z)
 
 
-def _sides(section: Section, poisson: float, width: float, height: float) -> Outline:
+def _rectangle_outline(section: Section, poisson: float, width: float, height: float) -> Outline:
     """Return the stress maps of a rectangle; its flexure neglects the effect of Poisson's ratio."""
     s = np.linspace(-0.5, 0.5, ALONG)
     half = np.full(ALONG, 0.5)
@@ -198,7 +198,11 @@ def _sides(section: Section, poisson: float, width: float, height: float) -> Out
 
 
 #: stress maps by type of section; other types have no known outline
-OUTLINES: dict[str, Callable[..., Outline]] = {"circle": _round, "tube": _round, "rectangle": _sides}
+OUTLINES: dict[str, Callable[..., Outline]] = {
+    "circle": _round_outline,
+    "tube": _round_outline,
+    "rectangle": _rectangle_outline,
+}
 
 
 def _torsion(y: np.ndarray, z: np.ndarray, width: float, height: float, J: Value) -> tuple[np.ndarray, np.ndarray]:

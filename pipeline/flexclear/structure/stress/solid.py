@@ -31,7 +31,7 @@ from flexclear.structure.fe.solid import elasticity
 from flexclear.structure.fe.solid.elasticity import Solid
 from flexclear.structure.fe.solid.elements import ELEMENTS, from_stress_points, sample_element
 from flexclear.structure.fe.solid.model import assemble, solid_of, surface, unknowns_of
-from flexclear.structure.fe.statics import support
+from flexclear.structure.fe.statics import factorise_supported
 from flexclear.system.errors import InputError
 
 #: rows and columns of the six components of a symmetric tensor, in the order of the dimension `tensor`
@@ -51,8 +51,8 @@ def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Mapping[st
     gauges: those of this body by name, as in `[output.gauges]`.  Raises InputError for one that is not on the surface.
     """
     model, unknowns, solid = assemble(mesh), unknowns_of(mesh), solid_of(mesh)
-    shown, doubtful = surface(mesh)[0], _doubtful(mesh)
-    places = _gauges(mesh, shown, gauges)
+    shown, doubtful = surface(mesh)[0], _near_rigid_ties(mesh)
+    places = _gauge_indices(mesh, shown, gauges)
     if doubtful[shown].all():
         artefact = "cells at a rigidly tied frame, where stress is an artefact of the tie"
         problem = f"all surface nodes lie in {artefact}"
@@ -119,12 +119,12 @@ def _inertia(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array) -> np.
 
 def _missing_response(model: Model, vectors: np.ndarray, omega: np.ndarray, loads: np.ndarray) -> np.ndarray:
     """Return the part of the response to each balanced load that the shapes lack, up to rigid motion, (ndof, loads)."""
-    flexibility = support(model, lambda _: None)
+    flexibility = factorise_supported(model, lambda _: None)
     balanced = flexibility.balance_loads(loads)
     return flexibility.response(balanced) - vectors @ ((vectors.T @ balanced) / omega[:, None] ** 2)
 
 
-def _doubtful(mesh: xr.Dataset) -> np.ndarray:
+def _near_rigid_ties(mesh: xr.Dataset) -> np.ndarray:
     """Return True for nodes with a cell that touches a rigidly tied node, shape (n,)."""
     rigid = np.flatnonzero(mesh["frame_tie"].values == "rigid")
     tied = np.zeros(mesh.sizes["node"], dtype=bool)
@@ -135,7 +135,9 @@ def _doubtful(mesh: xr.Dataset) -> np.ndarray:
     return touching
 
 
-def _gauges(mesh: xr.Dataset, shown: np.ndarray, gauges: Mapping[str, Mapping[str, Any]]) -> dict[str, np.ndarray]:
+def _gauge_indices(
+    mesh: xr.Dataset, shown: np.ndarray, gauges: Mapping[str, Mapping[str, Any]]
+) -> dict[str, np.ndarray]:
     """Return the indices of each gauge's nodes among the shown ones."""
     found = {}
     for name, gauge in gauges.items():

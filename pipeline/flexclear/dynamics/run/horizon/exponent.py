@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.artifacts.quantities import PERTURBATION, separated_from
+from flexclear.artifacts.quantities import PERTURBATION, index_of_separation
 from flexclear.dynamics.integrate import recording
 from flexclear.dynamics.run.evaluation.engine import Engine
 from flexclear.dynamics.run.evaluation.start import project
@@ -70,7 +70,7 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     largest = metric.norms(metric.motion(engine, rows)).max(axis=0, initial=0.0)
     separation = metric.distance(change, np.zeros_like(change), largest)
     time = trajectory.time
-    first = separated_from(time, separation, engine.end - engine.start)
+    first = index_of_separation(time, separation, engine.end - engine.start)
     mean, error = _slope(time, np.log(np.maximum(np.linalg.norm(change, axis=1), 1e-300)))
     return Growth(mean, error, engine.end if first is None else float(time[first]))
 

@@ -25,8 +25,8 @@ from flexclear.artifacts.quantities import (
     LASTING,
     PERTURBATION,
     SEPARATED,
-    divergence,
-    separated_from,
+    index_of_divergence,
+    index_of_separation,
 )
 from flexclear.dynamics import memory as m
 from flexclear.dynamics.integrate import recording
@@ -160,7 +160,7 @@ class Pair:
         if diverged is not None:
             shown = time <= self._examined_until(diverged)
             time, separation = time[shown], separation[shown]
-        k = separated_from(time, separation, self._span)
+        k = index_of_separation(time, separation, self._span)
         if k is None:
             return time, separation, None
         finer = self.outputs[(self.outputs > self.times[max(k - 1, 0)]) & (self.outputs < self.times[k])]
@@ -172,7 +172,7 @@ class Pair:
 
     def _diverged(self, separation: np.ndarray) -> int | None:
         """Return the index of the comparison from which on the two diverge."""
-        return divergence(self.times[: len(separation)], separation, self._span)
+        return index_of_divergence(self.times[: len(separation)], separation, self._span)
 
     def _examined_until(self, k: int) -> float:
         """Return the time [s] up to which a divergence that begins at comparison k is examined."""

@@ -154,7 +154,7 @@ class Search:
         """Return the run at a tolerance, compared up to a time [s] with the one at the next tighter tolerance."""
         run, other = self.until(rtol, until), self.until(self.next_rung(rtol), until)
         requested = self.requested(self.sizes)
-        errors = {q.name: quantities.error(run, other, q, until) / (1.0 - self.ratio) for q in requested}
+        errors = {q.name: quantities.largest_distance(run, other, q, until) / (1.0 - self.ratio) for q in requested}
         return Attempt(rtol, errors, max((errors[q.name] / w for q, w in requested.items()), default=0.0))
 
     def extrapolated(self, rtol: float, attempts: Sequence[Attempt]) -> Attempt | None:
@@ -338,7 +338,7 @@ def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> st
         return text
     quantity, run = parse(name, search.scene.owners()), search.shown[best.rtol]
     until = float(run["horizon"].values) if search.predictable and "horizon" in run else math.inf
-    if not best.errors[name] < STUCK * quantities.error(search.shown[looser], run, quantity, until):
+    if not best.errors[name] < STUCK * quantities.largest_distance(search.shown[looser], run, quantity, until):
         until_then = _trusted_until(search, best, quantity, requested[name])
         return f"{text}; tighter tolerances do not help{until_then}: the motion is chaotic or rounding decides"
     return f"{text}; this is the tightest tolerance"

@@ -23,7 +23,7 @@ from flexclear.dynamics.run.evaluation.start import consistent_start
 from flexclear.dynamics.run.progress_rate import Judge, Judges, Look, Panel, limited_by_stability, pace
 from flexclear.dynamics.run.refusals import refusal
 from flexclear.dynamics.run.run import engine_of
-from flexclear.scene.integrators import DEFAULT, STIFF, VIBRATING, by_need
+from flexclear.scene.integrators import DEFAULT, STIFF, VIBRATING, selectable_integrators
 from flexclear.scene.load import edited
 from flexclear.scene.schema import Scene
 from flexclear.system.errors import SolverError
@@ -253,7 +253,7 @@ ORDERS = {DEFAULT: 7.0, VIBRATING: 4.0, STIFF: 3.0}
 
 def method_costs(scene: Scene, bundles: Mapping[str, Labelled]) -> Costs:
     """Return the costs of a scene's methods that are known before any run."""
-    names = by_need(bool(scene.flexible()))
+    names = selectable_integrators(bool(scene.flexible()))
     engine = engine_of(
         edited(scene, {"solver.integrator": VIBRATING if VIBRATING in names else DEFAULT}), bundles, silent
     )

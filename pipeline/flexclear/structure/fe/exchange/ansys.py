@@ -14,10 +14,6 @@ import numpy as np
 from flexclear.system import machine
 from flexclear.system.errors import InputError
 
-#: longest time [s] for a file
-LONGEST = 300.0
-#: addresses [bytes] that the reader's libraries take before any file
-ADDRESSES = 4_000_000_000
 #: writes matrices, or numbers, positions and sets of nodes; held unknowns have the number `held`
 SCRIPT = """
 import sys
@@ -57,8 +53,17 @@ def arrays(path: Path, where: str) -> dict[str, np.ndarray]:
         raise InputError(where, problem, "pip install 'flexclear[fe]'")
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "arrays.npz"
-        command = [sys.executable, "-c", SCRIPT, str(path.resolve()), str(target), str(ADDRESSES + machine.memory())]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False)
+        command = [
+            sys.executable,
+            "-c",
+            SCRIPT,
+            str(path.resolve()),
+            str(target),
+            # 4_000_000_000: addresses [bytes] that the reader's libraries take before any file
+            str(4_000_000_000 + machine.available_memory()),
+        ]
+        # 300.0: longest time [s] for a file
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300.0, check=False)
         if not target.is_file():
             raise ValueError((done.stderr.strip().splitlines() or [f"its reader ended with {done.returncode}"])[-1])
         with np.load(target, allow_pickle=False) as data:

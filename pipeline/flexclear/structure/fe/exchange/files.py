@@ -20,7 +20,7 @@ from flexclear.structure.fe.exchange.programs import KEY, SMALLER, Entries
 from flexclear.structure.fe.model import DOFS, Model
 from flexclear.system import machine
 from flexclear.system.errors import InputError
-from flexclear.system.external_files import reading, require_file, require_whole
+from flexclear.system.external_files import convert_reader_errors, require_file, require_whole
 
 if TYPE_CHECKING:
     from flexclear.structure.fe.recipe import Matrices
@@ -143,7 +143,7 @@ def read(shape: Matrices, folder: Path, where: str) -> Contents:
 def _entries(path: Path, letter: str, where: str) -> Entries:
     """Return the entries of a MatrixMarket file, or of a file of another program."""
     require_file(path, where)
-    with reading(path, where, f"'{path.name}' cannot be read"), path.open("rb") as file:
+    with convert_reader_errors(path, where, f"'{path.name}' cannot be read"), path.open("rb") as file:
         first = file.read(14)
     if not first.startswith(b"%%") and path.suffix not in OPENERS:
         return programs.read(path, letter, where)
@@ -177,7 +177,7 @@ def _rows(shape: Matrices, folder: Path, parts: list[Entries], known: nodes.Node
 def read_npz(path: Path, where: str) -> Contents:
     """Read a file that `write_npz` wrote, or its arrays in HDF5; raise InputError when an array is missing."""
     require_file(path, where)
-    with reading(path, where, f"'{path.name}' holds no matrices", "write it with exchange.files"):
+    with convert_reader_errors(path, where, f"'{path.name}' holds no matrices", "write it with exchange.files"):
         data = _read_arrays(path, where)
         content = Table(
             _array(data, "node", "iu"), _array(data, "component", "iu"), _array(data, "position", "iuf", (None, 3))
@@ -238,7 +238,7 @@ def _matrix(path: Path, where: str) -> sp.coo_array:
     import scipy.io
 
     require_file(path, where)
-    with reading(path, where, f"'{path.name}' is not a MatrixMarket file"):
+    with convert_reader_errors(path, where, f"'{path.name}' is not a MatrixMarket file"):
         rows, columns, count, layout, field, symmetry = scipy.io.mminfo(path)
         if field not in ("real", "integer", "double") or symmetry not in ("general", "symmetric"):
             raise ValueError(f"its header says {field} {symmetry}; known: real or integer, general or symmetric")
@@ -289,7 +289,7 @@ def _table(path: Path, where: str, count: int) -> Table:
     require_file(path, where)
     hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
     with (
-        reading(path, where, f"'{path.name}' is not a table of unknowns", hint),
+        convert_reader_errors(path, where, f"'{path.name}' is not a table of unknowns", hint),
         path.open(encoding="utf-8", newline="") as file,
     ):
         rows = list(islice(csv.DictReader(file, skipinitialspace=True), count + 1))

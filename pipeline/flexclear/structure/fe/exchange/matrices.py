@@ -20,8 +20,8 @@ from flexclear.structure.fe.exchange import files, programs
 from flexclear.structure.fe.exchange.files import COMPONENTS, Contents, Table
 from flexclear.structure.fe.model import Drawn, Integrals, Model
 from flexclear.structure.fe.recipe import MatricesRecipe
-from flexclear.structure.fe.slices import Slices, at_centres, integrate, spread
-from flexclear.structure.fe.solid.mesh import mean
+from flexclear.structure.fe.slices import Slices, at_centres, integrate, second_moments
+from flexclear.structure.fe.solid.mesh import mean_motion
 from flexclear.structure.fe.solid.model import families, integrals
 from flexclear.structure.fe.vtu import vtu
 from flexclear.structure.sparse import cholesky
@@ -199,7 +199,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         position=positions,
         interfaces=frames,
         ends=tuple(frame for name in names[:2] for frame in frames if frame.name == name),
-        integrate=_integrate(mesh, M, component),
+        integrate=_integrator(mesh, M, component),
         families=families(positions, component),
         drawn=_points_to_draw(mesh, component),
         given=mesh["given_shape"].values if "given_shape" in mesh else None,
@@ -232,7 +232,8 @@ def _check_matrices(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, positio
         raise InputError(WHERE, "the mass matrix is not positive definite", "give every unknown a mass") from None
 
 
-def _integrate(mesh: xr.Dataset, M: sp.csr_array, component: np.ndarray) -> Callable[[np.ndarray], Integrals]:
+def _integrator(mesh: xr.Dataset, M: sp.csr_array, component: np.ndarray) -> Callable[[np.ndarray], Integrals]:
+    """Return the function that integrates motions over the volume: by given moments, slices, or one axis' mass."""
     if "pair_value" in mesh:
         return partial(_from_moments, mesh)
     node = mesh["unknown_node"].values
@@ -290,7 +291,7 @@ def frame_motion(mesh: xr.Dataset, component: np.ndarray, k: int) -> sp.csr_arra
     if len(tied) == 1:
         return pick
     x = mesh["unknown_position"].values[rows[:, 0]]
-    return sp.csr_array(mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x)) @ pick)
+    return sp.csr_array(mean_motion(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x)) @ pick)
 
 
 def nodal_loads(mesh: xr.Dataset) -> dict[str, list[tuple[str, int, np.ndarray]]]:
@@ -345,7 +346,7 @@ def _as_slices(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positio
     size = np.array([1.0] * 3 + [np.ptp(positions, axis=0).max()] * 3)
     if np.any(np.abs(expected - blocks) > ALIKE * mass[:, None, None] * np.outer(size, size)):
         return None
-    motion, D = at_centres(models.node_motion(index, component, len(first)), c), spread(J)
+    motion, D = at_centres(models.node_motion(index, component, len(first)), c), second_moments(J)
     return Slices(mass, positions[first] + c, D, motion, D, c)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from flexclear.structure.fe.exchange import ansys
 from flexclear.system import machine
 from flexclear.system.errors import InputError
-from flexclear.system.external_files import companions, reading, require_file
+from flexclear.system.external_files import companion_files, convert_reader_errors, require_file
 
 #: memory of a deck's lines over the size of the file
 COPIES = 8.0
@@ -39,7 +39,7 @@ def read(path: Path, where: str) -> Nodes:
     require_file(path, where)
     machine.require_memory(COPIES * path.stat().st_size, f"{where}: '{path.name}'", "write its nodes and sets alone")
     suffix = path.suffix.lower()
-    with reading(path, where, f"'{path.name}' has no readable nodes", "write the deck again"):
+    with convert_reader_errors(path, where, f"'{path.name}' has no readable nodes", "write the deck again"):
         if suffix == ".cdb":
             arrays = ansys.arrays(path, where)
             nodes = Nodes(
@@ -47,7 +47,7 @@ def read(path: Path, where: str) -> Nodes:
             )
             nodes.sets |= {name.removeprefix("set "): numbers for name, numbers in arrays.items()}
         else:
-            for file in companions(path):  # refuses includes in a circle
+            for file in companion_files(path):  # refuses includes in a circle
                 require_file(file, where)
             nodes = _of_keywords(path, where) if suffix == ".inp" else _of_cards(path, where)
         if not nodes.position or not np.isfinite(list(nodes.position.values())).all():
@@ -68,16 +68,16 @@ def _of_keywords(path: Path, where: str) -> Nodes:
             instances += keyword == "INSTANCE"
             if keyword in REFUSED or instances > 1 or (keyword == "NODE" and "SYSTEM" in options):
                 problem = f"*{keyword} changes numbers or axes of nodes"
-                refuse(file, number, where, problem, "write a flat deck without it")
+                refuse_line(file, number, where, problem, "write a flat deck without it")
             continue
-        with record(file, number, where):
+        with locate_unreadable_number(file, number, where):
             parts = [part.strip() for part in line.rstrip(",").split(",")]
             if keyword == "INSTANCE":
-                refuse(file, number, where, "*INSTANCE moves its nodes", "write a flat deck without it")
+                refuse_line(file, number, where, "*INSTANCE moves its nodes", "write a flat deck without it")
             elif keyword == "NODE":
                 label, *position = int(parts[0]), *map(float, parts[1:4])
                 if label in nodes.position:
-                    refuse(file, number, where, f"node {label} is defined twice", "write each node once")
+                    refuse_line(file, number, where, f"node {label} is defined twice", "write each node once")
                 nodes.position[label] = (*position, 0.0, 0.0)[:3]
                 if "NSET" in options:
                     chosen.setdefault(options["NSET"], set()).add(label)
@@ -111,17 +111,17 @@ def _of_cards(path: Path, where: str) -> Nodes:
     sets: list[tuple[str, list[int], range]] = []
     for number, name, values in cards(path):
         if name == "INCLUDE":
-            refuse(path, number, where, "INCLUDE is not followed", "write the deck as one file")
+            refuse_line(path, number, where, "INCLUDE is not followed", "write the deck as one file")
         if name in ("GRID", "GRDSET"):
             values += [""] * 8
             if any(values[k].strip() not in ("", "0") for k in (1, 5)):
                 problem = f"{name} {values[0].strip()} has its position or displacements in a local system"
-                refuse(path, number, where, problem, "write CP and CD in the basic system")
+                refuse_line(path, number, where, problem, "write CP and CD in the basic system")
         if name == "GRID":
-            with record(path, number, where):
+            with locate_unreadable_number(path, number, where):
                 nodes.position[int(values[0])] = tuple(parse_real(value) for value in values[2:5])
         if name == "SET1":
-            with record(path, number, where):
+            with locate_unreadable_number(path, number, where):
                 label, *members = [value.upper() for value in values if value]
                 if "THRU" in members:
                     first, _, last = members
@@ -174,14 +174,14 @@ def parse_real(text: str) -> float:
 
 
 @contextmanager
-def record(path: Path, number: int, where: str) -> Iterator[None]:
+def locate_unreadable_number(path: Path, number: int, where: str) -> Iterator[None]:
     """Raise InputError with the line of a file for a number that cannot be read."""
     try:
         yield
     except (ValueError, KeyError, IndexError):
-        refuse(path, number, where, "cannot be read", AGAIN)
+        refuse_line(path, number, where, "cannot be read", AGAIN)
 
 
-def refuse(path: Path, number: int, where: str, problem: str, remedy: str) -> NoReturn:
+def refuse_line(path: Path, number: int, where: str, problem: str, remedy: str) -> NoReturn:
     """Raise InputError for a line of a file."""
     raise InputError(where, f"line {number} of '{path.name}': {problem}", remedy)

@@ -20,7 +20,7 @@ from flexclear.structure.fe.exchange import ansys, nodes
 from flexclear.structure.fe.exchange.nodes import AGAIN
 from flexclear.system import machine
 from flexclear.system.errors import InputError
-from flexclear.system.external_files import reading, require_file
+from flexclear.system.external_files import convert_reader_errors, require_file
 
 #: memory while a text of entries is read, over the size of the file
 COPIES = 6.0
@@ -105,7 +105,7 @@ def read(path: Path, letter: str, where: str) -> Entries:
     require_file(path, where)
     machine.require_memory(COPIES * path.stat().st_size, f"{where}: '{path.name}'", SMALLER)
     suffix = path.suffix.lower()
-    with reading(path, where, f"'{path.name}' holds no matrix that is read here", AGAIN):
+    with convert_reader_errors(path, where, f"'{path.name}' holds no matrix that is read here", AGAIN):
         if suffix == ".sub":
             raise InputError(where, f"'{path.name}': superelements are not read", "write the full matrices, as .full")
         if suffix == ".full":
@@ -164,7 +164,7 @@ def _dmig(path: Path, letter: str, where: str) -> Entries:
         if card != "DMIG" or not values[0].upper().startswith(letter):
             continue
         names.add(values[0].upper())
-        with nodes.record(path, number, where):
+        with nodes.locate_unreadable_number(path, number, where):
             if values[1] != "0":
                 at = int(values[1]), int(values[2])
                 rows = [values[k : k + 3] for k in range(4, len(values) - 2, 4) if values[k]]
@@ -172,7 +172,7 @@ def _dmig(path: Path, letter: str, where: str) -> Entries:
                 entries += [nodes.parse_real(value) for _, _, value in rows]
             elif values[2] not in ("1", "6") or values[3] not in ("1", "2"):
                 problem = f"{values[0]} has form {values[2]} and type {values[3]}"
-                nodes.refuse(path, number, where, problem, "write a square and real matrix")
+                nodes.refuse_line(path, number, where, problem, "write a square and real matrix")
     _require_one(names, letter)
     node, direction, row, of_row = np.array(places, dtype=np.int64).reshape(-1, 4).T
     return Entries(node_keys(row, of_row), node_keys(node, direction), np.array(entries), True, path.name)
@@ -216,7 +216,7 @@ def _of_output4(
     values: list[float] = []
     column = row = 0
     for number, line in file:
-        with nodes.record(path, number, where):
+        with nodes.locate_unreadable_number(path, number, where):
             if "." in line and column > columns:
                 return rows, at, values
             if "." in line:
@@ -248,7 +248,7 @@ def _ansys(path: Path, letter: str, where: str) -> Entries:
 def unknowns(path: Path, where: str) -> np.ndarray:
     """Return the keys of the rows of a `.dof` file of CalculiX, lines `node.direction`."""
     require_file(path, where)
-    with reading(path, where, f"'{path.name}' is no list of node.direction", AGAIN):
+    with convert_reader_errors(path, where, f"'{path.name}' is no list of node.direction", AGAIN):
         lines = path.read_text(encoding="ascii").split()
         if other := next((k for k, line in enumerate(lines, 1) if not re.fullmatch(r"\d{1,15}\.\d", line)), None):
             raise ValueError(f"line {other} is none")
@@ -263,7 +263,10 @@ def read_listing(path: Path, where: str) -> tuple[np.ndarray, float | None]:
     frequency: list[float] = []
     mass: float | None = None
     waiting, column = False, 0
-    with reading(path, where, f"'{path.name}' is no listing"), path.open(encoding="utf-8", errors="replace") as file:
+    with (
+        convert_reader_errors(path, where, f"'{path.name}' is no listing"),
+        path.open(encoding="utf-8", errors="replace") as file,
+    ):
         for line in file:
             starts = [place for pattern, place in TABLES if pattern.search(line)]
             if starts:

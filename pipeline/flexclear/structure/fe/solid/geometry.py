@@ -13,9 +13,6 @@ from flexclear.structure.fe.solid.elements import ELEMENTS, HEX_FACES, TET_EDGES
 from flexclear.structure.fe.solid.recipe import Block, Cylinder
 from flexclear.system.errors import InputError
 
-#: largest distance of a mid-side, face or cell node from the mean of its corners, as a fraction of the cell's size
-ASTRAY = 0.3
-
 
 @dataclass(frozen=True)
 class Geometry:
@@ -107,7 +104,9 @@ def _check_numbering(geometry: Geometry, where: str) -> None:
     size = np.linalg.norm(np.ptp(X, axis=1), axis=1)
     for node, part in element.between.items():
         away = np.linalg.norm(X[:, node] - X[:, list(part)].mean(axis=1), axis=1)
-        wrong = np.flatnonzero(away > ASTRAY * size)
+        # 0.3: largest distance of a mid-side, face or cell node from the mean of its corners, as a fraction of the
+        # cell's size
+        wrong = np.flatnonzero(away > 0.3 * size)
         if wrong.size:
             raise InputError(
                 where,

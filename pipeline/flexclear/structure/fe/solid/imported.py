@@ -22,8 +22,6 @@ NAMES = {element.cell: name for name, element in ELEMENTS.items()}
 #: other cells that a file may hold; those of faces name surfaces
 FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 OTHER_CELLS = ("vertex", "line", "line3", *FACES)
-#: an integer array of cell data with more distinct values numbers the cells and names no regions
-MOST_REGIONS = 1000
 REWRITE = "export only its solid cells and named sets, or write VTU or Gmsh"
 
 
@@ -106,7 +104,8 @@ def _cell_groups(mesh: Mesh) -> list[tuple[str, list[np.ndarray]]]:
     groups = list(mesh.cell_sets.items())
     for key, values in mesh.cell_data.items():
         different = np.unique(np.concatenate(values))
-        for value in different if len(different) <= MOST_REGIONS else ():
+        # 1000: an integer array of cell data with more distinct values numbers the cells and names no regions
+        for value in different if len(different) <= 1000 else ():
             chosen = [np.flatnonzero(part == value) for part in values]
             groups.append((f"{key}={value}", chosen))
             if key == "gmsh:physical":

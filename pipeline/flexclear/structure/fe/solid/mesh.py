@@ -205,7 +205,7 @@ def check_rank(x: np.ndarray, where: str) -> None:
         raise InputError(where, problem, "select a face, or more nodes of it")
 
 
-def mean(x: np.ndarray, weight: np.ndarray, nodes: np.ndarray, position: np.ndarray, size: int) -> sp.csr_array:
+def mean_motion(x: np.ndarray, weight: np.ndarray, nodes: np.ndarray, position: np.ndarray, size: int) -> sp.csr_array:
     """Return the motion of a frame that follows nodes, as functionals of all displacements, shape (6, 3 size)."""
     w = weight / weight.sum()
     c = centre(x, w)

@@ -28,7 +28,7 @@ from flexclear.structure.fe.model import Drawn, Families, Integrals, Model
 from flexclear.structure.fe.solid import elasticity
 from flexclear.structure.fe.solid.elasticity import Solid
 from flexclear.structure.fe.solid.geometry import Geometry, boundary, face_nodes
-from flexclear.structure.fe.solid.mesh import mean
+from flexclear.structure.fe.solid.mesh import mean_motion
 
 #: families by direction, in their order within a cluster of equal frequencies
 FAMILIES = ("y", "z", "x")
@@ -146,7 +146,7 @@ def _motion(mesh: xr.Dataset, unknowns: Unknowns, k: int) -> sp.csr_array:
     tied = mesh["tie_frame"].values == k
     nodes, weight = mesh["tie_node"].values[tied], mesh["tie_weight"].values[tied]
     x, position = mesh["node_position"].values, mesh["frame_position"].values[k]
-    return sp.csr_array(mean(x[nodes], weight, nodes, position, len(x)) @ unknowns.spread)
+    return sp.csr_array(mean_motion(x[nodes], weight, nodes, position, len(x)) @ unknowns.spread)
 
 
 def families(position: np.ndarray, component: np.ndarray) -> Families:

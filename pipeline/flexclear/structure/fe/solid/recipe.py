@@ -80,13 +80,13 @@ class StepFile(Part):
     """type of the cells"""
 
 
-def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+def _require_direction(direction: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(direction):
         raise ValueError("a direction must not have length zero")
     return direction
 
 
-Pointing = Annotated[Direction, AfterValidator(_pointing)]
+Pointing = Annotated[Direction, AfterValidator(_require_direction)]
 
 
 class Plane(Part):
@@ -165,7 +165,7 @@ class SolidRecipe(BodyRecipe):
     """named frames and their nodes"""
 
     @model_validator(mode="after")
-    def _complete(self) -> SolidRecipe:
+    def _require_one_material(self) -> SolidRecipe:
         if (self.material is None) == (not self.materials):
             raise ValueError("give either `material` for the whole body or `materials` by region")
         return self

@@ -28,7 +28,7 @@ from flexclear.structure.fe.solid.geometry import Geometry
 from flexclear.structure.fe.solid.recipe import StepFile
 from flexclear.system import machine
 from flexclear.system.errors import FlexclearError, InputError
-from flexclear.system.external_files import reading, require_file
+from flexclear.system.external_files import convert_reader_errors, require_file
 
 #: Gmsh's number of each element, and its nodes in the order of VTK
 ELEMENTS = {"tet4": (4, (0, 1, 2, 3)), "tet10": (11, (0, 1, 2, 3, 4, 5, 6, 7, 9, 8))}
@@ -146,7 +146,7 @@ def open_step(path: Path, where: str) -> Iterator[Any]:
         for option, value in (("General.Terminal", 0), ("General.NumThreads", 1), ("General.AbortOnError", 2)):
             gmsh.option.setNumber(option, value)
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-        with reading(path, where, f"Gmsh cannot read '{path.name}'", "export it as STEP AP214 or AP242"):
+        with convert_reader_errors(path, where, f"Gmsh cannot read '{path.name}'", "export it as STEP AP214 or AP242"):
             gmsh.model.occ.importShapes(str(path), format="step")
             gmsh.model.occ.synchronize()
         if not gmsh.model.getEntities(3):
@@ -176,7 +176,9 @@ def _mesh(shape: StepFile, path: Path, where: str) -> Geometry:
         options = {"MeshSizeMax": shape.size, "MeshSizeFromCurvature": AROUND, "ElementOrder": order}
         for option, value in {**options, "HighOrderOptimize": order - 1, "RandomSeed": 1}.items():
             gmsh.option.setNumber(f"Mesh.{option}", value)
-        with reading(path, where, f"Gmsh cannot mesh '{path.name}'", "a smaller size, or repair the solid"):
+        with convert_reader_errors(
+            path, where, f"Gmsh cannot mesh '{path.name}'", "a smaller size, or repair the solid"
+        ):
             gmsh.model.mesh.generate(3)
         number, vtk = ELEMENTS[shape.element]
         _, nodes = gmsh.model.mesh.getElementsByType(number, mine)
