@@ -136,7 +136,7 @@ def test_one_file_one_core_or_no_process_to_be_had_need_no_second_process(
         patch.setattr(sys, "executable", str(files[0].parent / "not there"))
         with compiler_process.second_process(files) as process:
             assert process is None
-    monkeypatch.setattr(cores, "cores", lambda: 1)
+    monkeypatch.setattr(cores, "count_cores", lambda: 1)
     assert not compiler_process.is_useful()
 
 

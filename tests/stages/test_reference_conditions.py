@@ -107,7 +107,7 @@ def test_cases_take_the_scene_of_their_place() -> None:
 
 
 def test_ensembles_of_dear_sets_have_half_the_members(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(design, "require_whole_clusters", lambda place, condition, count: count)
+    monkeypatch.setattr(design, "whole", lambda place, condition, count: count)
     cases = design.clearance(8)
     assert len(set(cases)) == len(cases)
     assert {case.members for case in cases if case.condition == RIGID} == {0}
