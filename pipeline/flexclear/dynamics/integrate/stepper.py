@@ -279,7 +279,7 @@ def make_advance(
             begin(d)
             if loops:
                 poses.note(d)
-                poses.stand(d, d.time)
+                poses.keep_independence(d, d.time)
         return True
 
     @kernel
