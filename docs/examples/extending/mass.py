@@ -7,12 +7,12 @@ import argparse
 from flexclear.stages import scenes
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments to its parser."""
     parser.add_argument("scenes", nargs="+", metavar="SCENE")
 
 
-def command(options: argparse.Namespace) -> None:
+def run_command(options: argparse.Namespace) -> None:
     """Print a line for each scene."""
     for graph in scenes.graphs(options.scenes):
         total = sum(body.mass for body in graph.scene.rigid().values())

@@ -1,1 +1,1 @@
-"""Commands: a module for each verb with `arguments` and `command`."""
+"""Commands: a module for each verb with `add_arguments` and `run_command`."""
