@@ -15,6 +15,8 @@ from tests.properties.mechanisms import simulated
 CSJ = TREE / "scenes" / "sps4" / "csj.toml"
 FULL = TREE / "scenes" / "sps4" / "far_csj_cb.toml"
 IDEAL = TREE / "scenes" / "sps4" / "ideal.toml"
+#: what the reference's own rounding changes the platform's velocity by [m/s]
+ROUNDING = 4e-10
 
 
 def quiet(fraction, text):
@@ -35,13 +37,13 @@ def test_the_delivered_error_is_the_requested_one(reference, requested):
     delivered = quantities.largest_distance(run, reference, velocity) / size
     assert run.attrs["accuracy_verdict"] == "met"
     # a run is accepted whose estimate is at most that; estimates are good to some per cent, and at 1e-9 the
-    # reference's own rounding, 4e-10 m/s, is as large as what is compared
+    # reference's own rounding is as large as what is compared
     assert delivered < 3.0 * requested
     # nor is it too dear: errors jump from tolerance to tolerance, as impacts do, but a ten times looser one misses, or
     # its energy is refused
     with suppress(SolverError):
         looser = simulated(load_scene(CSJ, {"solver.rtol": 10.0 * run.attrs["accuracy_rtol"]}))
-        assert quantities.largest_distance(looser, reference, velocity) / size > requested
+        assert (quantities.largest_distance(looser, reference, velocity) + ROUNDING) / size > requested
 
 
 def test_several_quantities_are_met_together(reference):
