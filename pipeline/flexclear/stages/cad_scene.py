@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -11,9 +12,9 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
+    import numpy as np
+
     from flexclear.structure.fe.solid.step import Round, Solid
 
 #: steel, until the user says what the solids are made of
@@ -85,7 +86,10 @@ def _joints(names: list[str], found: list[Solid]) -> tuple[list[tuple[Place, Pla
     # shafts before holes without any, and those first that fit most closely
     for k in sorted(range(len(pairs)), key=lambda k: _looseness(*pairs[k])):
         first, second = _bodies(pairs[k])
-        same_axis, reached = [_bodies(pairs[n]) for n in kept if pairs[k][0][1].along(pairs[n][0][1], np.inf)], {first}
+        same_axis, reached = (
+            [_bodies(pairs[n]) for n in kept if pairs[k][0][1].along(pairs[n][0][1], math.inf)],
+            {first},
+        )
         for _ in same_axis:
             reached.update(*(bodies for bodies in same_axis if reached & {*bodies}))
         if second not in reached:
