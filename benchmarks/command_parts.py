@@ -27,7 +27,7 @@ PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_RUN}.model.model": {"tabulate": "assembling"},
     f"{_RUN}.run.horizon.horizon": {"Pair.perturbed_run": "integrating"},
     f"{_RUN}.run.run": {"RunInParts._advanced": "integrating", "observe_run": "recording"},
-    f"{_RUN}.record.dataset": {"recorded": "recording"},
+    f"{_RUN}.record.dataset": {"record_run": "recording"},
     "flexclear.post.single_run.series": {"derive_arrays": "deriving"},
 }
 _spent: dict[str, float] = {}
