@@ -51,5 +51,5 @@ def with_closed_contacts(scene: Scene, engine: Engine) -> Scene:
                 stops[contact.owner] = stops[contact.owner].model_copy(update={"initial_approach_speed": speed})
             else:
                 closed.setdefault(contact.owner, {})[contact.name.partition(".")[2]] = speed
-    parts["joint"] |= {name: parts["joint"][name].begun(speeds) for name, speeds in closed.items()}
+    parts["joint"] |= {name: parts["joint"][name].with_approach_speeds(speeds) for name, speeds in closed.items()}
     return scene.model_copy(update=parts)
