@@ -91,14 +91,14 @@ class Easing(Study):
 
     rate, deepest = 1e-9, 2.0 * CLEARANCE
 
-    def _evaluated(self, cycles: float, depths: dict[str, np.ndarray]) -> Wearing:
+    def _run_worn(self, cycles: float, depths: dict[str, np.ndarray]) -> Wearing:
         rates = {name: self.rate * (1.0 - depth / self.deepest) for name, depth in depths.items()}
         return Wearing(cycles, depths, 0.0, None, rates)  # type: ignore[arg-type]
 
 
 def test_steps_are_those_of_adams_and_bashforth_with_the_trapezoidal_rule_as_their_error() -> None:
     study = Easing(scene(outer_share=0.5), None, tolerance=1e-4)  # type: ignore[arg-type]
-    study.go_on(1e5)
+    study.wear_until(1e5)
     at = np.array([one.cycles for one in study.steps])
     h, r = (np.array([kind(one)[0, 0, 0] for one in study.steps]) for kind in
             (lambda one: one.depths["hole"], lambda one: one.rates["hole"]))  # fmt: skip
