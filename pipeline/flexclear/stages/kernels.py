@@ -68,6 +68,6 @@ def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> E
 
     engine = engine_of(scene, reduced, progress)
     consistent_start(engine)
-    engine.specialised.worthwhile = True  # what long runs come to use
-    engine.settle(progress)
+    for engine.specialised.worthwhile in (False, True):  # as steps of short runs, and of long ones
+        engine.settle(progress)
     return engine
