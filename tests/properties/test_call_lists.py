@@ -149,7 +149,7 @@ def spoilt(path: Path) -> None:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder of compiled code."""
     for module in (functions, store):
-        monkeypatch.setattr(module, "round_for_scene", lambda root, report: tmp_path)
+        monkeypatch.setattr(module, "writable", lambda root, report: tmp_path)
     return tmp_path
 
 
