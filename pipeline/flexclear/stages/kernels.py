@@ -68,6 +68,7 @@ def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> E
 
     engine = engine_of(scene, reduced, progress)
     consistent_start(engine)
-    for engine.specialised.worthwhile in (False, True):  # as steps of short runs, and of long ones
-        engine.settle(progress)
+    engine.settle(progress)  # as short runs step
+    engine.specialised.worthwhile = True  # and as long ones do
+    engine.settle(progress)
     return engine

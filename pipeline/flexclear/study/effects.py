@@ -69,9 +69,11 @@ def examine_effects(
     if pairs:
         ran |= {gone: variant(gone) for gone in combined(effects)}
         runs.points(ran, levels[-1])
-        tight |= runs.refused
-        ran = {gone: variant(gone) for gone in ran}
-        runs.points(ran, levels[-1])
+        if again := runs.refused - tight:
+            tight |= again
+            repeated = {gone: variant(gone) for gone in ran if gone in again}
+            runs.points(repeated, levels[-1])
+            ran |= repeated
     members = {name: reached[gone] for name, gone in removed.items() if gone in reached}
     words = {effect.name: effect.words for effect in effects} | {IDEAL: IDEAL}
     if removed.get(IDEAL) in [gone for name, gone in removed.items() if name != IDEAL]:
