@@ -58,7 +58,7 @@ def function(name: str, address: int) -> Callable:
     return made
 
 
-def address_of_entries(array: np.ndarray, kind: type = np.float64) -> int:
+def address(array: np.ndarray, kind: type = np.float64) -> int:
     """Return the address of an array's entries for C functions; raise TypeError for another type or memory layout."""
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"an array of {array.dtype}, {array.strides} bytes apart, instead of {kind.__name__} in a row")
@@ -68,24 +68,12 @@ def address_of_entries(array: np.ndarray, kind: type = np.float64) -> int:
 def addresses_of_arrays(arrays: Arrays) -> tuple[int, ...]:
     """Return the addresses of h, f, w and n."""
     h, f, w, n = arrays
-    return (
-        address_of_entries(h, np.int64),
-        address_of_entries(f),
-        address_of_entries(w),
-        address_of_entries(n, np.int64),
-    )
+    return address(h, np.int64), address(f), address(w), address(n, np.int64)
 
 
 def record(outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> tuple[int, ...]:
     """Return the arguments of `advance` for output times, rows of the record and events."""
-    return (
-        address_of_entries(outputs),
-        len(outputs),
-        address_of_entries(rows),
-        *rows.shape,
-        address_of_entries(events),
-        *events.shape,
-    )
+    return address(outputs), len(outputs), address(rows), *rows.shape, address(events), *events.shape
 
 
 @dataclass(frozen=True)
@@ -104,15 +92,8 @@ class Entry:
 
     def observe(self, arrays: Arrays, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
         """Evaluate the outputs of every row; arrays: h, f, w and n."""
-        given = (
-            address_of_entries(rows),
-            *rows.shape,
-            address_of_entries(pieces, np.int64),
-            *pieces.shape,
-            tolerance,
-            address_of_entries(out),
-            len(out),
-        )
+        laws = address(pieces, np.int64), *pieces.shape
+        given = address(rows), *rows.shape, *laws, tolerance, address(out), len(out)
         function("observe", self.addresses["observe"])(*addresses_of_arrays(arrays), *given)
 
     def advance(self, arrays: Arrays, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
